@@ -1,0 +1,351 @@
+"""The ``naisr`` command: argument parsing only; each command calls one function of the library."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import json
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import App, CycloptsError, Parameter
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+from naisr_model import __version__
+from naisr_model.errors import Cancelled, InputError
+
+app = App(
+    name="naisr",
+    version=__version__,
+    help="Shape atlases that explain: prepare data, train, inspect, evaluate and export.",
+)
+_console = Console(stderr=True)
+
+
+@app.command
+def populate(name: str, out: Path, *, patients: int | None = None, seed: int = 0) -> None:
+    """Write a synthetic population (meshes, landmarks, CSV) as a hospital would hand it over.
+
+    Args:
+        name: airway or bodies.
+        out: folder to write into.
+        patients: how many patients; left out, the population's own number.
+        seed: the same seed gives the same files.
+    """
+    from naisr_model.data.populations import population
+
+    size = {} if patients is None else {"patients": patients}
+    with _bar(f"writing {name}") as progress, _stoppable() as stop:
+        table = population(name).write_population(out, seed=seed, progress=progress, should_stop=stop, **size)
+    print(table)
+
+
+@app.command
+def prepare(
+    table: Path,
+    *,
+    out: Path,
+    surface_samples: int = 100_000,
+    near_samples: int = 400_000,
+    uniform_samples: int = 100_000,
+    held_out: float = 0.2,
+    seed: int = 0,
+    workers: int | None = None,
+) -> None:
+    """Turn a CSV of meshes and covariates into a store of samples to train on.
+
+    A run that was stopped goes on where it was. Meshes that cannot be used are listed with the
+    reason and left out.
+
+    Args:
+        table: CSV with the columns mesh, subject, visit, then covariates; a TOML file of the same
+            name beside it may set units, kinds and the alignment.
+        out: folder of the store.
+        surface_samples: points with normals on each surface.
+        near_samples: signed distances close to each surface.
+        uniform_samples: signed distances anywhere in the box.
+        held_out: share of the subjects kept for evaluation.
+        seed: of the split and of the samples.
+        workers: processes; left out, one a core.
+    """
+    from naisr_model.data.prepare import PrepareOptions
+    from naisr_model.data.prepare import prepare as run
+
+    options = PrepareOptions(surface_samples, near_samples, uniform_samples, held_out, seed, workers)
+    with _bar("preparing") as progress, _stoppable() as stop:
+        report = run(table, out, options=options, progress=progress, should_stop=stop)
+    for remark in report.rejected:
+        print(f"rejected {remark.path} (row {remark.row}): {remark.reason}")
+    for remark in report.warnings:
+        print(f"warning {remark.path} (row {remark.row}): {remark.reason}")
+    print(
+        f"{len(report.accepted)} shapes in {out} ({len(report.skipped)} were there already), "
+        f"{len(report.rejected)} rejected"
+    )
+
+
+@app.command
+def train(
+    store: Path,
+    *,
+    out: Path,
+    preset: str = "demo",
+    config: Path | None = None,
+    epochs: int | None = None,
+    time_budget: Annotated[str | None, Parameter(help="as 90s, 45m or 1.5h")] = None,
+    seed: int | None = None,
+    device: str = "cpu",
+) -> None:
+    """Train an atlas; stop it whenever you like, the same command goes on.
+
+    OUT can be opened from the first minute on; OUT.training/ beside it keeps the state to resume
+    from, a TensorBoard log and the template at chosen epochs.
+
+    Args:
+        store: made by 'naisr prepare'.
+        out: the .safetensors file to write.
+        preset: demo (two CPU cores), paper-airway, paper-hippocampus or paper-starman.
+        config: a TOML file with settings on top of the preset.
+        epochs: passes over the training shapes.
+        time_budget: train for about so long.
+        seed: of the initial weights and of every draw.
+        device: cpu, cuda or mps.
+    """
+    from naisr_model.config import preset as named
+    from naisr_model.config import read_toml
+    from naisr_model.data.store import SampleStore
+    from naisr_model.learning.train import train as run
+
+    budget = None if time_budget is None else _seconds(time_budget)
+    chosen = named(preset) if config is None else read_toml(config, named(preset))
+    changes: dict[str, Any] = {"epochs": epochs, "seed": seed}
+    training = dataclasses.replace(chosen.training, **{k: v for k, v in changes.items() if v is not None})
+    with _training_bar() as report, _stoppable() as stop:
+        checkpoint = run(
+            SampleStore.open(store),
+            dataclasses.replace(chosen, training=training),
+            out,
+            time_budget_s=budget,
+            report=report,
+            should_stop=stop,
+            device=device,
+        )
+    print(f"{out} after {checkpoint.training['iterations']} iterations")
+    if "folded_share" in checkpoint.training:
+        print(f"folded points near the surface: {100 * checkpoint.training['folded_share']:.2f} %")
+
+
+@app.command
+def mesh(
+    atlas: Path,
+    out: Path,
+    *,
+    set: Annotated[
+        list[str] | None, Parameter(name="--set", negative=(), help="covariate, as age=120")
+    ] = None,
+    effect: str | None = None,
+    template: bool = False,
+    resolution: int = 128,
+    extrapolate: bool = False,
+) -> None:
+    """Write one surface of an atlas in millimetres (STL, PLY, OBJ or GLB by the file's name).
+
+    Args:
+        atlas: the .safetensors file.
+        out: the mesh to write.
+        set: covariate values in real units; the others are at the population centre.
+        effect: the covariate whose disentangled shape is wanted instead of the full shape.
+        template: write the template.
+        resolution: cells along a side of the box, a multiple of 8.
+        extrapolate: allow values outside the observed range.
+    """
+    from naisr_model.atlas import Atlas
+    from naisr_model.files import replacing
+
+    loaded = Atlas.load(atlas)
+    values = _values(loaded, set or [])
+    if template:
+        surface = loaded.template(resolution)
+    elif effect is not None:
+        if effect not in values:
+            raise InputError(f"--effect {effect} needs its value, as --set {effect}=VALUE")
+        surface = loaded.effect(effect, values[effect], None, resolution, extrapolate=extrapolate)
+    else:
+        surface = loaded.shape(values, None, resolution, extrapolate=extrapolate)
+    if out.suffix.lower() not in (".stl", ".ply", ".obj", ".glb"):
+        raise InputError(f"cannot write '{out.suffix}'; name the file .stl, .ply, .obj or .glb")
+    with replacing(out) as temporary:
+        surface.export(temporary)
+    print(f"{out}: {len(surface.faces)} faces, {surface.volume / 1000:.2f} cm³")
+
+
+@app.command
+def info(atlas: Path) -> None:
+    """Show what an atlas is made of."""
+    from naisr_model.checkpoint import load
+
+    checkpoint = load(atlas)
+    population = checkpoint.population
+    held_out = int(population.held_out.sum())
+    weights = sum(tensor.numel() for tensor in checkpoint.weights.values())
+    print(
+        f"{checkpoint.name}: {len(population)} shapes of {len(set(population.subjects))} subjects, ", end=""
+    )
+    print(f"{held_out} shapes held out")
+    for covariate in population.covariates:
+        low, high = (covariate.format(value) for value in covariate.range)
+        print(f"  {covariate.name}: {low} to {high}, centre {covariate.format(covariate.centre)}")
+    print(f"networks: {weights:,} weights, latent code of {checkpoint.preset.network.latent}")
+    print(f"box: {2 * checkpoint.frame.scale_mm:.0f} mm wide, alignment by {checkpoint.alignment.method}")
+    for key, value in {**checkpoint.source, **checkpoint.training}.items():
+        print(f"{key}: {value}")
+
+
+evaluate = App(name="evaluate", help="Measure how good an atlas is.")
+app.command(evaluate)
+
+
+@evaluate.command
+def reconstruction(
+    atlas: Path,
+    *,
+    store: Path | None = None,
+    json_file: Annotated[Path | None, Parameter(name="--json")] = None,
+    steps: int = 800,
+    limit: int = 0,
+) -> None:
+    """Refit the held-out shapes with their covariates known, and check the effects where the truth is known.
+
+    Args:
+        atlas: the .safetensors file.
+        store: where its held-out shapes are; not needed for the synthetic populations, which are
+            made again from their seed.
+        json_file: also write the figures to this file.
+        steps: Adam steps of each fit.
+        limit: at most so many held-out shapes; 0 takes all.
+    """
+    from naisr_model.atlas import Atlas
+    from naisr_model.data.store import SampleStore
+    from naisr_model.evaluation.reconstruction import EvaluationConfig
+    from naisr_model.evaluation.reconstruction import evaluate as run
+    from naisr_model.evaluation.tables import PUBLISHED_AIRWAY, reconstruction_markdown
+    from naisr_model.files import replacing
+
+    loaded = Atlas.load(atlas)
+    config = EvaluationConfig(limit=limit)
+    config = dataclasses.replace(config, fit=dataclasses.replace(config.fit, steps=steps))
+    with _bar("evaluating") as progress, _stoppable() as stop:
+        report = run(
+            loaded,
+            config,
+            None if store is None else SampleStore.open(store),
+            progress=progress,
+            should_stop=stop,
+        )
+    print(reconstruction_markdown(report, PUBLISHED_AIRWAY if loaded.name == "airway" else ()))
+    if json_file is not None:
+        with replacing(json_file) as temporary:
+            temporary.write_text(json.dumps(report, indent=1), encoding="utf-8")
+
+
+def _values(atlas: Any, settings: list[str]) -> dict[str, float]:
+    known = {covariate.name: covariate for covariate in atlas.covariates}
+    values = {}
+    for setting in settings:
+        name, equals, text = setting.partition("=")
+        if not equals or name not in known:
+            raise InputError(
+                f"'--set {setting}' is not understood; write NAME=VALUE with one of {', '.join(known)}"
+            )
+        values[name] = known[name].parse(text)
+    return values
+
+
+def _seconds(text: str) -> float:
+    factor = {"s": 1.0, "m": 60.0, "h": 3600.0}.get(text[-1:], 0.0)
+    try:
+        seconds = factor * float(text[:-1])
+    except ValueError:
+        seconds = 0.0
+    if not seconds > 0:
+        raise InputError(f"the time budget is '{text}'; write it as 90s, 45m or 1.5h")
+    return seconds
+
+
+@contextlib.contextmanager
+def _bar(label: str) -> Iterator[Callable[[float], None]]:
+    with Progress(
+        TextColumn(label),
+        BarColumn(),
+        TextColumn("{task.percentage:.0f} %"),
+        TimeRemainingColumn(),
+        console=_console,
+    ) as bar:
+        task = bar.add_task(label, total=1.0)
+        yield lambda share: bar.update(task, completed=share)
+
+
+@contextlib.contextmanager
+def _training_bar() -> Iterator[Callable[[Any], None]]:
+    columns = (
+        TextColumn("epoch {task.fields[epoch]}"),
+        BarColumn(),
+        TextColumn(
+            "loss {task.fields[loss]:.3f}  {task.fields[speed]:,.0f} points/s  {task.fields[left]} left"
+        ),
+    )
+    with Progress(*columns, console=_console) as bar:
+        task = bar.add_task("training", total=None, epoch=0, loss=float("nan"), speed=0.0, left="?")
+
+        def report(told: Any) -> None:
+            minutes, seconds = divmod(int(told.seconds_left), 60)
+            bar.update(
+                task,
+                completed=told.iteration,
+                total=told.iterations,
+                epoch=told.epoch,
+                loss=told.losses["total"],
+                speed=told.points_per_second,
+                left=f"{minutes}:{seconds:02d}",
+            )
+
+        yield report
+
+
+@contextlib.contextmanager
+def _stoppable() -> Iterator[Callable[[], bool]]:
+    """Ctrl+C asks for a clean end; a second one ends at once."""
+    asked = False
+
+    def ask(_signal: int, _frame: object) -> None:
+        nonlocal asked
+        if asked:
+            raise KeyboardInterrupt
+        asked = True
+
+    previous = signal.signal(signal.SIGINT, ask)
+    try:
+        yield lambda: asked
+    finally:
+        signal.signal(signal.SIGINT, previous)
+
+
+def main() -> int:
+    """Entry point: 0 on success, 2 for input that cannot be used, 130 when stopped by the user."""
+    try:
+        app(result_action="return_value", exit_on_error=False, print_error=False)
+    except (InputError, CycloptsError) as error:
+        print(f"naisr: {error}", file=sys.stderr)
+        return 2
+    except (Cancelled, KeyboardInterrupt):
+        print("naisr: stopped; what was finished is kept", file=sys.stderr)
+        return 130
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

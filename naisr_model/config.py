@@ -1,0 +1,247 @@
+"""Frozen settings with named presets, readable from TOML.
+
+A preset is the whole description of a training. The ``paper-*`` presets carry the published
+settings of NAISR (Jiao et al., ICLR 2024, section "Implementation Details"); ``demo`` is the one
+that trains on two CPU cores, and its comments say why it differs.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import tomllib
+import typing
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+from naisr_model.errors import InputError
+
+C = TypeVar("C")
+
+
+@dataclass(frozen=True)
+class SirenConfig:
+    """A sine MLP: one input layer, ``hidden`` hidden-to-hidden layers, one linear output layer.
+
+    Attributes:
+        width: units of every hidden layer.
+        hidden: hidden-to-hidden layers; the paper's ``N_l`` counts ``hidden + 2``.
+        omega0: frequency of the sines; a lower one gives a smoother function.
+    """
+
+    width: int = 256
+    hidden: int = 4
+    omega0: float = 30.0
+
+
+@dataclass(frozen=True)
+class NetworkConfig:
+    """Sizes of the template network T and of the displacement networks f_i.
+
+    Attributes:
+        dim: 2 for curves, 3 for surfaces.
+        latent: length of the latent code z.
+        template: the network T.
+        displacement: every network f_i.
+    """
+
+    dim: int = 3
+    latent: int = 256
+    template: SirenConfig = field(default_factory=SirenConfig)
+    displacement: SirenConfig = field(default_factory=SirenConfig)
+
+
+@dataclass(frozen=True)
+class LossWeights:
+    """Weights of the loss terms; the first six are the paper's lambda_1 ... lambda_6.
+
+    Attributes:
+        surface_eikonal: lambda_1, | |grad Phi| - 1 | on the surface.
+        surface_distance: lambda_2, |Phi| on the surface.
+        surface_normal: lambda_3, 1 - <grad Phi, n> on the surface.
+        space_distance: lambda_4, |Phi - s| off the surface.
+        space_eikonal: lambda_5, | |grad Phi| - 1 | off the surface.
+        latent: multiplies |z|^2 / (L sigma^2), so 2 is the paper's lambda_6 = 2 / L.
+        latent_sigma: sigma of the latent prior.
+        centring: squared mean over the two levels of each binary covariate's displacement at z = 0.
+            The level 0 between them is never observed, so without this term that displacement could
+            carry any offset common to everybody and the template would stand elsewhere.
+        ridge: mean squared displacement at z = 0, which settles what the data leave open.
+        folding: mean of max(0, -det(I + grad d)) at surface points; 0 leaves it out.
+    """
+
+    surface_eikonal: float = 10.0
+    surface_distance: float = 30.0
+    surface_normal: float = 10.0
+    space_distance: float = 100.0
+    space_eikonal: float = 10.0
+    latent: float = 2.0
+    latent_sigma: float = 0.01
+    centring: float = 0.0
+    ridge: float = 0.0
+    folding: float = 0.0
+
+
+@dataclass(frozen=True)
+class TrainingConfig:
+    """How the networks and codes are optimised.
+
+    Attributes:
+        epochs: passes over the training shapes.
+        batch_shapes: shapes in a batch.
+        surface_points: on-surface points of a shape in a batch.
+        near_points: off-surface points close to the surface.
+        uniform_points: off-surface points uniform in the box; too few of them leave ghost surfaces.
+        network_rate: Adam's learning rate for the networks.
+        latent_rate: Adam's learning rate for the codes.
+        cosine: let both rates fall to zero along a cosine instead of staying constant.
+        population_share: first part of the training, in which every code is 0, so that the
+            covariates explain what they can before the codes may.
+        anchor_share: part of every later batch that is trained at z = 0, which keeps Phi(c, 0) the
+            population's shape at c.
+        residual_latents: project the codes on the orthogonal complement of a smooth basis in the
+            covariates, so that a code cannot carry what a covariate explains.
+        template_epochs: epochs at which the template is kept as a mesh.
+        seed: of the initial weights and of every draw.
+        loss: weights of the terms.
+    """
+
+    epochs: int = 3000
+    batch_shapes: int = 64
+    surface_points: int = 500
+    near_points: int = 200
+    uniform_points: int = 50
+    network_rate: float = 5e-5
+    latent_rate: float = 1e-3
+    cosine: bool = False
+    population_share: float = 0.0
+    anchor_share: float = 0.0
+    residual_latents: bool = False
+    template_epochs: tuple[int, ...] = ()
+    seed: int = 0
+    loss: LossWeights = field(default_factory=LossWeights)
+
+
+@dataclass(frozen=True)
+class Preset:
+    """Everything that ``naisr train`` needs to know beside the data."""
+
+    network: NetworkConfig = field(default_factory=NetworkConfig)
+    training: TrainingConfig = field(default_factory=TrainingConfig)
+
+
+@dataclass(frozen=True)
+class FitConfig:
+    """How a latent code is fitted to one shape (section "Testing" of the paper).
+
+    Attributes:
+        steps: Adam steps.
+        rate: Adam's learning rate.
+        surface_points: on-surface points drawn at each step.
+        space_points: off-surface points drawn at each step, half of them near the surface.
+        seed: of the draws.
+    """
+
+    steps: int = 800
+    rate: float = 5e-3
+    surface_points: int = 500
+    space_points: int = 250
+    seed: int = 0
+
+
+_DEEP = SirenConfig(hidden=6)
+
+PRESETS: dict[str, Preset] = {
+    "paper-airway": Preset(),
+    "paper-hippocampus": Preset(
+        NetworkConfig(template=_DEEP, displacement=_DEEP), TrainingConfig(epochs=300)
+    ),
+    "paper-starman": Preset(
+        NetworkConfig(dim=2, template=_DEEP, displacement=_DEEP), TrainingConfig(epochs=300)
+    ),
+    # Low frequencies train in minutes what omega0 = 30 needs hours for; the displacement is the
+    # smoother of the two, because anatomy changes with age more slowly than it bends in space.
+    # Half of the off-surface points are uniform in the box: thin tubes leave ghosts otherwise.
+    "demo": Preset(
+        NetworkConfig(
+            latent=64,
+            template=SirenConfig(width=192, hidden=3, omega0=10.0),
+            displacement=SirenConfig(width=128, hidden=2, omega0=3.0),
+        ),
+        TrainingConfig(
+            epochs=220,
+            batch_shapes=16,
+            surface_points=256,
+            near_points=128,
+            uniform_points=128,
+            network_rate=4e-4,
+            latent_rate=2e-3,
+            cosine=True,
+            population_share=0.25,
+            anchor_share=0.25,
+            residual_latents=True,
+            template_epochs=(1, 5, 20, 100),
+            loss=LossWeights(centring=3.0, ridge=0.02),
+        ),
+    ),
+}
+
+
+def preset(name: str) -> Preset:
+    """The preset called ``name``.
+
+    Raises:
+        InputError: when there is none.
+    """
+    if name not in PRESETS:
+        raise InputError(f"there is no preset '{name}'; choose one of {', '.join(PRESETS)}")
+    return PRESETS[name]
+
+
+def to_json(config: Any) -> dict[str, Any]:
+    """A frozen config as nested plain dictionaries."""
+    return dataclasses.asdict(config)
+
+
+def from_json(kind: type[C], record: dict[str, Any], base: C | None = None, where: str = "") -> C:
+    """The inverse of :func:`to_json`; keys left out keep the value they have in ``base``.
+
+    Raises:
+        InputError: for a key that ``kind`` does not have or a value of another type.
+    """
+    hints = typing.get_type_hints(kind)
+    base = kind() if base is None else base
+    if unknown := sorted(set(record) - set(hints)):
+        raise InputError(f"unknown setting '{where}{unknown[0]}'; known are {', '.join(hints)}")
+    changes = {
+        key: _converted(hints[key], value, getattr(base, key), f"{where}{key}")
+        for key, value in record.items()
+    }
+    return dataclasses.replace(base, **changes)  # type: ignore[type-var]
+
+
+def _converted(kind: Any, value: Any, base: Any, where: str) -> Any:
+    if dataclasses.is_dataclass(kind) and isinstance(kind, type):
+        if not isinstance(value, dict):
+            raise InputError(f"setting '{where}' is {value!r}; expected a table")
+        return from_json(kind, value, base, f"{where}.")
+    if typing.get_origin(kind) is tuple:
+        return tuple(value)
+    if kind is float and isinstance(value, int) and not isinstance(value, bool):
+        return float(value)
+    if not isinstance(value, kind) or isinstance(value, bool) is not (kind is bool):
+        raise InputError(f"setting '{where}' is {value!r}; expected {kind.__name__}")
+    return value
+
+
+def read_toml(path: Path, base: Preset) -> Preset:
+    """``base`` with the settings of a TOML file (tables ``network`` and ``training``) on top.
+
+    Raises:
+        InputError: for an unreadable file, an unknown setting or a value of the wrong type.
+    """
+    try:
+        record = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"cannot read the settings in {path}: {error}") from error
+    return from_json(Preset, record, base)

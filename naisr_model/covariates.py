@@ -1,0 +1,203 @@
+"""The vocabulary of a population: what was measured of each shape, in real units.
+
+A model never sees months or kilograms: :meth:`Covariate.normalise` maps a real value to the
+centred number ``c_i`` of the paper, where 0 is the population centre.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from naisr_model.errors import InputError
+
+Kind = Literal["continuous", "binary"]
+Values = Mapping[str, float]
+"""Covariate values in real units by name; for a binary covariate -1 ... +1."""
+
+
+@dataclass(frozen=True)
+class Covariate:
+    """One measured property of a subject.
+
+    Attributes:
+        name: as in the CSV header, for example ``age``.
+        unit: unit of the real value, for example ``months``; empty where there is none.
+        kind: ``continuous``, or ``binary`` (then the real value is -1 or +1).
+        centre: real value at which ``c_i = 0``: the training mean, 0 for a binary covariate.
+        scale: real units per model unit: the training standard deviation, 1 for a binary one.
+        range: smallest and largest observed real value.
+        levels: names of -1 and +1 for a binary covariate, for example ``("F", "M")``.
+    """
+
+    name: str
+    unit: str
+    kind: Kind
+    centre: float
+    scale: float
+    range: tuple[float, float]
+    levels: tuple[str, str] = ("-1", "+1")
+
+    def normalise(self, value: ArrayLike) -> NDArray[np.float64]:
+        """Real units to the centred ``c_i``; any shape."""
+        return (np.asarray(value, dtype=np.float64) - self.centre) / self.scale
+
+    def restore(self, normalised: ArrayLike) -> NDArray[np.float64]:
+        """The inverse of :meth:`normalise`."""
+        return np.asarray(normalised, dtype=np.float64) * self.scale + self.centre
+
+    def parse(self, text: str) -> float:
+        """Read ``text`` as a real value: a number, or the name of a level.
+
+        Raises:
+            InputError: when ``text`` is neither.
+        """
+        text = text.strip()
+        if self.kind == "binary" and text in self.levels:
+            return (-1.0, 1.0)[self.levels.index(text)]
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            expected = " or ".join(self.levels) if self.kind == "binary" else f"a number in {self.unit}"
+            raise InputError(f"covariate '{self.name}' is '{text}'; expected {expected}")
+        return value
+
+    def format(self, value: float) -> str:
+        """The value as people write it, with its unit: ``120 months``, ``M``, ``between F and M``."""
+        if self.kind == "binary":
+            if abs(value) == 1:
+                return self.levels[int(value > 0)]
+            return f"between {self.levels[0]} and {self.levels[1]} ({value:+.2f})"
+        return f"{value:.4g} {self.unit}".rstrip()
+
+    def to_json(self) -> dict[str, Any]:
+        """A plain dictionary that :meth:`from_json` reads back."""
+        return {
+            "name": self.name,
+            "unit": self.unit,
+            "kind": self.kind,
+            "centre": self.centre,
+            "scale": self.scale,
+            "range": list(self.range),
+            "levels": list(self.levels),
+        }
+
+    @classmethod
+    def from_json(cls, record: dict[str, Any]) -> Covariate:
+        """The inverse of :meth:`to_json`."""
+        low, high = record["range"]
+        minus, plus = record["levels"]
+        return cls(
+            name=str(record["name"]),
+            unit=str(record["unit"]),
+            kind=record["kind"],
+            centre=float(record["centre"]),
+            scale=float(record["scale"]),
+            range=(float(low), float(high)),
+            levels=(str(minus), str(plus)),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Population:
+    """The subjects an atlas was made from, one row a visit.
+
+    Attributes:
+        covariates: the columns of ``values``.
+        subjects: subject identifier of each row.
+        visits: visit identifier of each row; (subject, visit) is unique.
+        values: real units, float64 ``[n, len(covariates)]``.
+        held_out: bool ``[n]``, true for the rows kept for evaluation; whole subjects only.
+    """
+
+    covariates: tuple[Covariate, ...]
+    subjects: tuple[str, ...]
+    visits: tuple[str, ...]
+    values: NDArray[np.float64]
+    held_out: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.subjects)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The covariates' names, in column order."""
+        return tuple(covariate.name for covariate in self.covariates)
+
+    @property
+    def centre(self) -> dict[str, float]:
+        """Real values at which every ``c_i`` is 0."""
+        return {covariate.name: covariate.centre for covariate in self.covariates}
+
+    def observed(self, name: str) -> NDArray[np.float64]:
+        """Training values of one covariate in real units, ``[n_train]``."""
+        return self.values[~self.held_out, self.names.index(name)]
+
+    def row(self, index: int) -> dict[str, float]:
+        """Real covariate values of one visit by name."""
+        return dict(zip(self.names, map(float, self.values[index]), strict=True))
+
+    def normalised(self) -> NDArray[np.float64]:
+        """Centred covariates of all rows, ``[n, N]``."""
+        columns = [c.normalise(self.values[:, i]) for i, c in enumerate(self.covariates)]
+        return np.stack(columns, axis=1)
+
+    def to_json(self) -> dict[str, Any]:
+        """A plain dictionary that :meth:`from_json` reads back."""
+        return {
+            "covariates": [covariate.to_json() for covariate in self.covariates],
+            "subjects": list(self.subjects),
+            "visits": list(self.visits),
+            "values": self.values.tolist(),
+            "held_out": self.held_out.tolist(),
+        }
+
+    @classmethod
+    def from_json(cls, record: dict[str, Any]) -> Population:
+        """The inverse of :meth:`to_json`."""
+        covariates = tuple(Covariate.from_json(item) for item in record["covariates"])
+        values = np.asarray(record["values"], dtype=np.float64).reshape(-1, len(covariates))
+        return cls(
+            covariates=covariates,
+            subjects=tuple(map(str, record["subjects"])),
+            visits=tuple(map(str, record["visits"])),
+            values=values,
+            held_out=np.asarray(record["held_out"], dtype=bool),
+        )
+
+
+def complete(
+    covariates: tuple[Covariate, ...], values: Values, *, extrapolate: bool = False
+) -> dict[str, float]:
+    """Fill in missing covariates with the population centre and check the others.
+
+    Raises:
+        InputError: for an unknown name, a value that is not finite, or (unless ``extrapolate``)
+            one outside the observed range.
+    """
+    known = {covariate.name for covariate in covariates}
+    if unknown := sorted(set(values) - known):
+        raise InputError(f"unknown covariate '{unknown[0]}'; this atlas has {', '.join(sorted(known))}")
+    for covariate in covariates:
+        value = values.get(covariate.name, covariate.centre)
+        low, high = covariate.range
+        if not math.isfinite(value):
+            raise InputError(f"covariate '{covariate.name}' is {value}; give a finite number")
+        if not extrapolate and not low - 1e-9 <= value <= high + 1e-9:
+            raise InputError(
+                f"covariate '{covariate.name}' is {value:g} {covariate.unit}; the atlas was trained on "
+                f"{low:g} to {high:g}; pass --extrapolate (extrapolate=True in Python) to go on"
+            )
+    return {c.name: float(values.get(c.name, c.centre)) for c in covariates}
+
+
+def normalised_vector(covariates: tuple[Covariate, ...], values: Values) -> NDArray[np.float64]:
+    """Complete real ``values`` as the vector ``c``, ``[N]``."""
+    return np.array([float(c.normalise(values[c.name])) for c in covariates])

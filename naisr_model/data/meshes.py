@@ -1,0 +1,147 @@
+"""Reading surface meshes, repairing small faults and turning down what is not the surface of a body.
+
+Coordinates are taken as millimetres whatever the format says.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import igl
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from naisr_model.errors import InputError
+
+READERS = {".stl", ".ply", ".obj", ".vtk", ".vtp", ".glb"}
+"""The file endings that :func:`read_mesh` knows."""
+
+OPEN_SHARE = 0.1
+"""Largest |sum of area vectors| / area: 0 for a closed surface, 0.5 for a cup, 1 for a plane."""
+
+FLAT_SHARE = 1e-3
+"""Smallest volume, as a share of that of the sphere with the same area."""
+
+
+def read_mesh(path: str | Path) -> trimesh.Trimesh:
+    """Read one triangle mesh; polygons are triangulated, nothing else is changed.
+
+    Args:
+        path: an STL, PLY, OBJ, VTK, VTP or GLB file; coordinates in millimetres.
+
+    Raises:
+        InputError: when the file is missing, of another kind, unreadable, without faces, or has a
+            coordinate that is not finite.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"{path} does not exist; correct the path")
+    suffix = path.suffix.lower()
+    if suffix not in READERS:
+        raise InputError(f"{path.name} is not one of {', '.join(sorted(READERS))}; convert it first")
+    try:
+        vertices, faces = _read_glb(path) if suffix == ".glb" else _read_polydata(path)
+    except Exception as error:  # the readers raise whatever they like on damaged files
+        raise InputError(f"{path.name} cannot be read ({error}); export it again") from error
+    if not len(faces):
+        raise InputError(f"{path.name} has no faces; it is empty, damaged or a point cloud")
+    if not np.isfinite(vertices).all():
+        raise InputError(f"{path.name} has vertices that are not finite numbers; export it again")
+    return trimesh.Trimesh(vertices, faces, process=False)
+
+
+def _read_glb(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    scene = trimesh.load_scene(path, process=False)
+    mesh = scene.to_mesh()
+    return np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
+
+
+def _read_polydata(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    import pyvista
+
+    with pyvista.vtk_verbosity("off"):
+        data = pyvista.read(path)
+    if not isinstance(data, pyvista.PolyData):
+        data = data.extract_surface()
+    data = data.triangulate()
+    return np.asarray(data.points, np.float64), np.asarray(data.regular_faces, np.int64)
+
+
+def repair_mesh(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+    """Merge duplicated vertices, drop degenerate and repeated faces, and turn the faces outward.
+
+    Winding that differs between neighbours is made consistent first. A component that is inside
+    out is turned round unless it lies within the others, where it is a cavity.
+    """
+    mesh = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    mesh.merge_vertices(merge_tex=True, merge_norm=True)
+    mesh.update_faces(mesh.nondegenerate_faces(height=0.0) & mesh.unique_faces())
+    mesh.remove_unreferenced_vertices()
+    if not len(mesh.faces):
+        return mesh
+    vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
+    if not mesh.is_winding_consistent:
+        faces, _ = igl.bfs_orient(faces)
+    return trimesh.Trimesh(vertices, _face_outward(vertices, faces), process=False)
+
+
+def _face_outward(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Turn round the components whose faces look inward, ``faces`` being consistently wound."""
+    count, component = igl.facet_components(faces)
+    volumes = np.array([_volume(vertices, faces[component == i]) for i in range(count)])
+    inward = volumes < 0
+    positive = np.where(inward[component][:, None], faces[:, ::-1], faces)
+    for i in np.flatnonzero(inward):
+        others = positive[component != i]
+        inside = len(others) and _winding(vertices, others, vertices[faces[component == i][:1, 0]])[0] > 0.5
+        inward[i] = not inside
+    return np.where(inward[component][:, None], faces[:, ::-1], faces)
+
+
+def _volume(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> float:
+    """Signed volume about the faces' own centre, so that open patches have a sensible sign too."""
+    corners = vertices[faces] - vertices[faces].mean(axis=(0, 1))
+    return float(np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))) / 6
+
+
+def _winding(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], points: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    return np.asarray(igl.fast_winding_number(vertices, np.ascontiguousarray(faces), points))
+
+
+def check_mesh(mesh: trimesh.Trimesh) -> tuple[str, ...]:
+    """Decide whether a repaired mesh bounds a body.
+
+    Returns:
+        What is odd but bearable, one phrase each: open edges, several components.
+
+    Raises:
+        InputError: when there are no faces, or the surface is flat or open.
+    """
+    if not len(mesh.faces):
+        raise InputError("the mesh has no faces; check how it was exported")
+    vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
+    area_vectors = np.cross(*np.moveaxis(np.diff(vertices[faces], axis=1), 1, 0)) / 2
+    area = float(np.linalg.norm(area_vectors, axis=1).sum())
+    opening = float(np.linalg.norm(area_vectors.sum(axis=0))) / area if area else 1.0
+    if opening > OPEN_SHARE:
+        raise InputError(f"the surface is open (opening {opening:.0%} of its area); close its holes first")
+    if _volume(vertices, faces) < FLAT_SHARE * area**1.5 / (6 * np.sqrt(np.pi)):
+        raise InputError("the surface encloses no volume; it must bound a body")
+    return _oddities(faces)
+
+
+def _oddities(faces: NDArray[np.int64]) -> tuple[str, ...]:
+    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    _, uses = np.unique(edges, axis=0, return_counts=True)
+    open_edges, components = int((uses == 1).sum()), igl.facet_components(faces)[0]
+    return tuple(
+        phrase
+        for phrase, applies in (
+            (f"{open_edges} open edges", open_edges > 0),
+            (f"{components} components", components > 1),
+        )
+        if applies
+    )

@@ -1,0 +1,197 @@
+"""Prepared samples on disk, read in small random pieces.
+
+Layout: ``store.json`` (what the samples are) and, a folder a shape, ``surface.npy``, ``near.npy``,
+``uniform.npy`` (shuffled float32 rows, see :class:`~naisr_model.data.samples.ShapeSamples`) and
+``mesh.ply`` (aligned, millimetres).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from naisr_model.covariates import Population
+from naisr_model.data.align import Alignment
+from naisr_model.data.samples import ShapeSamples
+from naisr_model.errors import InputError
+from naisr_model.files import replacing
+from naisr_model.frames import Frame
+
+VERSION = 1
+INDEX = "store.json"
+SHAPES = "shapes"
+KINDS = ("surface", "near", "uniform")
+
+
+class Draw(NamedTuple):
+    """A random subset of the samples of ``S`` shapes, float32, model units.
+
+    Attributes:
+        surface_points: ``[S, n_surface, dim]``.
+        surface_normals: outward unit normals, ``[S, n_surface, dim]``.
+        space_points: the near points, then the uniform ones, ``[S, n_near + n_uniform, dim]``.
+        space_sdf: signed distance of each space point, negative inside, ``[S, n_near + n_uniform]``.
+    """
+
+    surface_points: NDArray[np.float32]
+    surface_normals: NDArray[np.float32]
+    space_points: NDArray[np.float32]
+    space_sdf: NDArray[np.float32]
+
+
+class _Block(NamedTuple):
+    """Where the rows of one ``.npy`` file begin and how many there are."""
+
+    path: Path
+    offset: int
+    rows: int
+    columns: int
+
+
+@dataclass(frozen=True, eq=False)
+class SampleStore:
+    """Samples of a whole population; open it with :meth:`open`.
+
+    Holds no open file, so it may be handed to other processes and threads.
+
+    Attributes:
+        path: the store's folder.
+        name: of the population.
+        population: every shape in the store, held-out rows included.
+        frame: millimetres to model units.
+        alignment: scanner millimetres to the atlas frame.
+        source: how the data were made; empty for a user's own.
+        options: sample counts, split and seed that the store was prepared with.
+        folders: one folder name a row.
+        blocks: sample files by row and kind, filled on first use.
+    """
+
+    path: Path
+    name: str
+    population: Population
+    frame: Frame
+    alignment: Alignment
+    source: dict[str, Any]
+    options: dict[str, Any]
+    folders: tuple[str, ...]
+    blocks: dict[tuple[int, str], _Block]
+
+    @classmethod
+    def open(cls, path: str | Path) -> SampleStore:
+        """Open a prepared store; reads the index alone.
+
+        Raises:
+            InputError: when ``path`` is not a finished store or a newer program wrote it.
+        """
+        path = Path(path)
+        record = _read_index(path / INDEX)
+        return cls(
+            path=path,
+            name=record["name"],
+            population=Population.from_json(record["population"]),
+            frame=Frame.from_json(record["frame"]),
+            alignment=Alignment.from_json(record["alignment"]),
+            source=record["source"],
+            options=record["options"],
+            folders=tuple(record["shapes"]),
+            blocks={},
+        )
+
+    def __len__(self) -> int:
+        return len(self.folders)
+
+    def folder(self, row: int) -> Path:
+        """The folder of one shape."""
+        return self.path / SHAPES / self.folders[row]
+
+    def mesh(self, row: int) -> trimesh.Trimesh:
+        """The repaired and aligned surface of one row, millimetres in the atlas frame."""
+        return trimesh.load_mesh(self.folder(row) / "mesh.ply", process=False)
+
+    def samples(self, row: int) -> ShapeSamples:
+        """All samples of one row, memory-mapped read-only."""
+        surface, near, uniform = (np.load(self.folder(row) / f"{kind}.npy", mmap_mode="r") for kind in KINDS)
+        return ShapeSamples(surface, near, uniform)
+
+    def draw(
+        self, rows: Sequence[int], n_surface: int, n_near: int, n_uniform: int, rng: np.random.Generator
+    ) -> Draw:
+        """Read a random subset of each row's samples; ``rng`` alone decides which.
+
+        The files are shuffled, so one contiguous block at a random offset is a random subset.
+
+        Raises:
+            InputError: when a shape has fewer samples than asked for.
+        """
+        surface = np.stack([self._block(row, "surface", n_surface, rng) for row in rows])
+        near = np.stack([self._block(row, "near", n_near, rng) for row in rows])
+        uniform = np.stack([self._block(row, "uniform", n_uniform, rng) for row in rows])
+        space, dim = np.concatenate([near, uniform], axis=1), self.frame.dim
+        return Draw(surface[..., :dim], surface[..., dim:], space[..., :dim], space[..., dim])
+
+    def _block(self, row: int, kind: str, count: int, rng: np.random.Generator) -> NDArray[np.float32]:
+        # Plain reads instead of lasting memory maps: a map a file would exhaust the usual limit of
+        # 1024 open files at a few hundred shapes, and a read of a cached block costs about as little.
+        block = self.blocks.get((row, kind)) or self._open_block(row, kind)
+        if count > block.rows:
+            raise InputError(
+                f"{count} {kind} samples were asked for but the store has {block.rows} a shape; "
+                f"prepare it again with more"
+            )
+        start = int(rng.integers(0, block.rows - count + 1))
+        offset = block.offset + start * block.columns * 4
+        flat = np.fromfile(block.path, np.float32, count * block.columns, offset=offset)
+        return flat.reshape(count, block.columns)
+
+    def _open_block(self, row: int, kind: str) -> _Block:
+        path = self.folder(row) / f"{kind}.npy"
+        array = np.lib.format.open_memmap(path, mode="r")
+        block = _Block(path, int(array.offset), *map(int, array.shape))
+        self.blocks[row, kind] = block
+        return block
+
+
+def _read_index(path: Path) -> dict[str, Any]:
+    if not path.is_file():
+        raise InputError(f"{path.parent} is not a finished sample store; run 'naisr prepare' first")
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+        version = int(record["version"])
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{path} is damaged ({error}); run 'naisr prepare' again") from error
+    if version > VERSION:
+        raise InputError(f"{path} was written by a newer version of this program; update the program")
+    return dict(record)
+
+
+def write_index(
+    path: Path,
+    *,
+    name: str,
+    population: Population,
+    frame: Frame,
+    alignment: Alignment,
+    source: dict[str, Any],
+    options: dict[str, Any],
+    folders: Sequence[str],
+) -> None:
+    """Write ``store.json`` atomically; a store exists from this moment on."""
+    record = {
+        "version": VERSION,
+        "name": name,
+        "population": population.to_json(),
+        "frame": frame.to_json(),
+        "alignment": alignment.to_json(),
+        "source": source,
+        "options": options,
+        "shapes": list(folders),
+    }
+    with replacing(path / INDEX) as temporary:
+        temporary.write_text(json.dumps(record, indent=1), encoding="utf-8")

@@ -1,0 +1,1 @@
+"""How good an atlas is: distances between shapes, and the tables that report them."""

@@ -1,0 +1,44 @@
+"""The loss terms, each a pure function of fields already evaluated; means over shapes and points.
+
+Equations of section "Training" of Jiao et al. (ICLR 2024). All lengths are in model units.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+
+def eikonal(gradient: Tensor) -> Tensor:
+    """L_Eikonal: mean of | |grad Phi| - 1 |; ``gradient [..., n, dim]``."""
+    return (gradient.norm(dim=-1) - 1).abs().mean()
+
+
+def distance(predicted: Tensor, target: Tensor | float) -> Tensor:
+    """L_Dirichlet: mean of |Phi - s|; ``target`` is 0 on the surface."""
+    return (predicted - target).abs().mean()
+
+
+def normal(gradient: Tensor, normals: Tensor) -> Tensor:
+    """L_Neumann: mean of 1 - cos(grad Phi, n); both ``[..., n, dim]``."""
+    return (1 - torch.cosine_similarity(gradient, normals, dim=-1)).mean()
+
+
+def latent_prior(latents: Tensor, sigma: float) -> Tensor:
+    """L_lat without its weight: mean over shapes of |z|^2 / (L sigma^2); ``latents [shapes, L]``."""
+    return latents.square().mean() / sigma**2
+
+
+def centring(at_minus: Tensor, at_plus: Tensor) -> Tensor:
+    """Mean squared offset that a binary covariate's two displacements share; ``[..., n, dim]`` each."""
+    return ((at_minus + at_plus) / 2).square().sum(dim=-1).mean()
+
+
+def ridge(displacements: Tensor) -> Tensor:
+    """Mean squared length of displacements; ``[..., n, dim]``."""
+    return displacements.square().sum(dim=-1).mean()
+
+
+def folding(determinant: Tensor) -> Tensor:
+    """Mean of max(0, -det(I + grad d)): positive only where the deformation folds."""
+    return torch.relu(-determinant).mean()

@@ -1,0 +1,92 @@
+"""The whole loss of a batch: which fields are evaluated where, and the weighted sum of terms."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from naisr_model.config import LossWeights
+from naisr_model.learning import losses
+from naisr_model.networks.calculus import deformation_determinant, gradient
+from naisr_model.networks.naisr import Naisr
+
+
+class Batch(NamedTuple):
+    """Samples of some shapes in model units.
+
+    Attributes:
+        surface_points: ``[shapes, n_on, dim]``.
+        surface_normals: outward unit normals, ``[shapes, n_on, dim]``.
+        space_points: off the surface, ``[shapes, n_off, dim]``.
+        space_sdf: signed distances there, ``[shapes, n_off]``.
+    """
+
+    surface_points: Tensor
+    surface_normals: Tensor
+    space_points: Tensor
+    space_sdf: Tensor
+
+    @classmethod
+    def from_arrays(cls, *arrays: object, device: torch.device | str = "cpu") -> Batch:
+        """The four arrays as tensors on ``device``."""
+        return cls(*(torch.as_tensor(array, device=device) for array in arrays))
+
+    def narrow(self, start: int, stop: int) -> Batch:
+        """The shapes ``start`` to ``stop``."""
+        return Batch(*(part[start:stop] for part in self))
+
+
+def reconstruction_terms(
+    network: Naisr, batch: Batch, covariates: Tensor, latents: Tensor, weights: LossWeights
+) -> dict[str, Tensor]:
+    """The weighted terms L_on and L_off of a batch, and the folding term where it is asked for.
+
+    On- and off-surface points go through the networks together, so that they are evaluated once.
+    """
+    on = batch.surface_points.shape[1]
+    points = torch.cat([batch.surface_points, batch.space_points], dim=1).requires_grad_()
+    values, displacement = network(points, covariates, latents)
+    slope = gradient(values, points)
+    terms = {
+        "surface_eikonal": weights.surface_eikonal * losses.eikonal(slope[:, :on]),
+        "surface_distance": weights.surface_distance * losses.distance(values[:, :on], 0.0),
+        "surface_normal": weights.surface_normal * losses.normal(slope[:, :on], batch.surface_normals),
+        "space_distance": weights.space_distance * losses.distance(values[:, on:], batch.space_sdf),
+        "space_eikonal": weights.space_eikonal * losses.eikonal(slope[:, on:]),
+    }
+    if weights.folding:
+        determinant = deformation_determinant(displacement, points)[:, :on]
+        terms["folding"] = weights.folding * losses.folding(determinant)
+    return terms
+
+
+def population_terms(
+    network: Naisr, points: Tensor, covariates: Tensor, binary: tuple[int, ...], weights: LossWeights
+) -> dict[str, Tensor]:
+    """What settles the effects where the data leave them open, at z = 0.
+
+    Args:
+        network: the networks.
+        points: ``[shapes, n, dim]``.
+        covariates: of those shapes, ``[shapes, N]``.
+        binary: columns of ``covariates`` that only ever are -1 or +1.
+        weights: ``centring`` and ``ridge`` are used.
+    """
+    latents = covariates.new_zeros(len(covariates), network.config.latent)
+    terms: dict[str, Tensor] = {}
+    if weights.ridge:
+        displacements = network.displacements(points, covariates, latents)
+        terms["ridge"] = weights.ridge * losses.ridge(displacements)
+    if weights.centring and binary:
+        columns = list(binary)
+        minus = network.displacements(points, -torch.ones_like(covariates), latents)[columns]
+        plus = network.displacements(points, torch.ones_like(covariates), latents)[columns]
+        terms["centring"] = weights.centring * losses.centring(minus, plus)
+    return terms
+
+
+def latent_term(latents: Tensor, weights: LossWeights) -> dict[str, Tensor]:
+    """The weighted prior on the codes."""
+    return {"latent": weights.latent * losses.latent_prior(latents, weights.latent_sigma)}

@@ -1,0 +1,53 @@
+"""The fields of trained networks as plain functions of points, ready for a lattice."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from naisr_model.networks.calculus import deformation_determinant
+from naisr_model.networks.naisr import Naisr
+from naisr_model.surface.sparse import Field
+
+
+def template_field(network: Naisr) -> Field:
+    """T in model units."""
+
+    def field(points: NDArray[np.float32]) -> NDArray[np.float32]:
+        with torch.inference_mode():
+            return network.template(torch.from_numpy(points)[None])[0].numpy()
+
+    return field
+
+
+def shape_field(network: Naisr, covariates: Tensor, latent: Tensor) -> Field:
+    """Phi at ``covariates [N]`` (centred) and ``latent [L]``, in model units."""
+
+    def field(points: NDArray[np.float32]) -> NDArray[np.float32]:
+        with torch.inference_mode():
+            values, _ = network(torch.from_numpy(points)[None], covariates[None], latent[None])
+        return values[0].numpy()
+
+    return field
+
+
+def effect_field(network: Naisr, index: int, covariates: Tensor, latent: Tensor) -> Field:
+    """Phi_i of the covariate ``index``, in model units."""
+
+    def field(points: NDArray[np.float32]) -> NDArray[np.float32]:
+        with torch.inference_mode():
+            values = network.effect(index, torch.from_numpy(points)[None], covariates[None], latent[None])
+        return values[0].numpy()
+
+    return field
+
+
+def folded(
+    network: Naisr, points: NDArray[np.float32], covariates: Tensor, latent: Tensor
+) -> NDArray[np.bool_]:
+    """Where p -> p + d(p) folds, that is det(I + grad d) <= 0; ``[n]`` for ``points [n, dim]``."""
+    located = torch.from_numpy(points)[None].requires_grad_()
+    _, displacement = network(located, covariates[None], latent[None])
+    return (deformation_determinant(displacement, located)[0] <= 0).numpy(force=True)

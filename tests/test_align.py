@@ -1,0 +1,130 @@
+"""Known rigid motions are found again."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial.transform import Rotation
+
+from naisr_model.data.align import (
+    Alignment,
+    icp_alignment,
+    landmark_alignment,
+    read_landmarks,
+    rigid_transform,
+)
+from naisr_model.errors import InputError
+
+NAMES = ("cords", "carina", "choana", "epiglottis", "tongue base")
+POINTS = np.array([[0, 0, 0], [0, -5, -90], [5, 40, 80], [0, 12, 25], [-8, 20, 40]], dtype=float)
+
+
+def named(points) -> dict[str, tuple[float, float, float]]:
+    return {name: tuple(map(float, point)) for name, point in zip(NAMES, points, strict=True)}
+
+
+def moved(points, rng, degrees=25.0):
+    rotation = Rotation.from_rotvec(np.radians(degrees) * rng.uniform(-1, 1, 3))
+    return rotation.apply(points) + rng.uniform(-100, 100, 3)
+
+
+def apply(matrix, points):
+    return points @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def is_rigid(matrix) -> bool:
+    rotation = matrix[:3, :3]
+    return np.allclose(rotation @ rotation.T, np.eye(3)) and np.isclose(np.linalg.det(rotation), 1)
+
+
+def test_none_leaves_the_scan_where_it_is():
+    np.testing.assert_array_equal(rigid_transform(Alignment(), trimesh.Trimesh()), np.eye(4))
+
+
+@pytest.mark.parametrize("origin", ["cords", ""])
+def test_landmarks_undo_any_rigid_motion(origin):
+    rng = np.random.default_rng(0)
+    scans = [moved(POINTS, rng) for _ in range(6)]
+    alignment = landmark_alignment([named(scan) for scan in scans], origin)
+    reference = np.array([alignment.reference[name] for name in NAMES])
+    for scan in scans:
+        matrix = rigid_transform(alignment, trimesh.Trimesh(), named(scan))
+        assert is_rigid(matrix)
+        np.testing.assert_allclose(apply(matrix, scan), reference, atol=1e-6)
+    np.testing.assert_allclose(reference[0] if origin else reference.mean(axis=0), 0, atol=1e-9)
+
+
+def test_the_origin_is_exact_and_size_is_kept_when_shapes_differ():
+    rng = np.random.default_rng(1)
+    scans = [moved(POINTS * size + rng.normal(0, 2, POINTS.shape), rng) for size in (0.5, 0.8, 1.0, 1.3)]
+    alignment = landmark_alignment([named(scan) for scan in scans], "cords")
+    for scan in scans:
+        found = apply(rigid_transform(alignment, trimesh.Trimesh(), named(scan)), scan)
+        np.testing.assert_allclose(found[0], 0, atol=1e-9)
+        assert np.linalg.norm(found[1]) == pytest.approx(np.linalg.norm(scan[1] - scan[0]))
+
+
+def test_a_landmark_missing_from_one_scan_is_done_without():
+    rng = np.random.default_rng(2)
+    alignment = landmark_alignment([named(moved(POINTS, rng)) for _ in range(4)], "cords")
+    scan = moved(POINTS, rng)
+    some = {name: point for name, point in named(scan).items() if name != "choana"}
+    whole = rigid_transform(alignment, trimesh.Trimesh(), named(scan))
+    np.testing.assert_allclose(rigid_transform(alignment, trimesh.Trimesh(), some), whole, atol=1e-6)
+
+
+def test_unusable_landmarks_are_explained():
+    alignment = landmark_alignment([named(POINTS)], "cords")
+    with pytest.raises(InputError, match="'cords'"):
+        rigid_transform(alignment, trimesh.Trimesh(), {"carina": (0.0, 0.0, 0.0)})
+    with pytest.raises(InputError, match="3 landmarks"):
+        rigid_transform(alignment, trimesh.Trimesh(), {"cords": (0.0, 0.0, 0.0)})
+    line = named(np.outer(np.arange(5), [1.0, 2.0, 3.0]))
+    with pytest.raises(InputError, match="one line"):
+        rigid_transform(alignment, trimesh.Trimesh(), line)
+    with pytest.raises(InputError, match="'larynx'"):
+        landmark_alignment([named(POINTS)], "larynx")
+    with pytest.raises(InputError, match="3 landmarks that every subject has"):
+        landmark_alignment([named(POINTS), {"cords": (0.0, 0.0, 0.0)}], "cords")
+
+
+def test_landmark_files_are_read_or_explained(tmp_path):
+    path = tmp_path / "landmarks.csv"
+    path.write_text("name,x,y,z\ncords,1,2.5,-3\ncarina,0,0,0\n")
+    assert read_landmarks(path) == {"cords": (1.0, 2.5, -3.0), "carina": (0.0, 0.0, 0.0)}
+    path.write_text("name,x,y\ncords,1,2\n")
+    with pytest.raises(InputError, match="name,x,y,z"):
+        read_landmarks(path)
+    path.write_text("name,x,y,z\ncords,1,two,3\n")
+    with pytest.raises(InputError, match="numbers"):
+        read_landmarks(path)
+    with pytest.raises(InputError, match="cannot be read"):
+        read_landmarks(tmp_path / "gone.csv")
+
+
+def knobbly() -> trimesh.Trimesh:
+    """A smooth body without symmetry."""
+    mesh = trimesh.creation.icosphere(4, radius=1.0)
+    x, y, z = mesh.vertices.T
+    mesh.vertices *= (1 + 0.2 * x * y + 0.15 * z**2 * x + 0.1 * y * z)[:, None] * [30.0, 20.0, 45.0]
+    return mesh
+
+
+def test_icp_undoes_a_rigid_motion():
+    body = knobbly()
+    alignment = icp_alignment(body)
+    rng = np.random.default_rng(4)
+    scan = body.copy()
+    scan.vertices = moved(body.vertices, rng, degrees=12.0)
+    unmoved, found = rigid_transform(alignment, body), rigid_transform(alignment, scan)
+    assert is_rigid(found)
+    error_mm = np.linalg.norm(apply(found, scan.vertices) - apply(unmoved, body.vertices), axis=1)
+    assert error_mm.max() < 0.2
+
+
+def test_an_alignment_survives_json():
+    alignment = landmark_alignment([named(POINTS)], "cords")
+    assert Alignment.from_json(json.loads(json.dumps(alignment.to_json()))) == alignment

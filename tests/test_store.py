@@ -1,0 +1,115 @@
+"""Drawing random subsets from a store on disk."""
+
+from __future__ import annotations
+
+import json
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from naisr_model.covariates import Covariate, Population
+from naisr_model.data.align import Alignment
+from naisr_model.data.store import Draw, SampleStore, write_index
+from naisr_model.errors import InputError
+from naisr_model.frames import Frame
+
+COUNTS = {"surface": (50, 6), "near": (80, 4), "uniform": (30, 4)}
+
+
+@pytest.fixture
+def store(tmp_path) -> SampleStore:
+    """Three shapes whose samples carry their own address: row, kind, line."""
+    for row in range(3):
+        folder = tmp_path / "shapes" / f"shape{row}"
+        folder.mkdir(parents=True)
+        for k, (kind, (lines, columns)) in enumerate(COUNTS.items()):
+            address = 1000 * row + 100 * k + np.arange(lines)[:, None] + np.zeros(columns)
+            np.save(folder / f"{kind}.npy", address.astype(np.float32))
+        trimesh.creation.icosphere(1, radius=1.0 + row).export(folder / "mesh.ply")
+    age = Covariate("age", "months", "continuous", 2.0, 1.0, (1.0, 3.0))
+    population = Population((age,), tuple("abc"), ("1",) * 3, np.arange(3.0)[:, None], np.zeros(3, bool))
+    write_index(
+        tmp_path,
+        name="test",
+        population=population,
+        frame=Frame((1.0, 2.0, 3.0), 40.0),
+        alignment=Alignment("landmarks", "cords", {"cords": (0.0, 0.0, 0.0)}),
+        source={"population": "airway", "seed": 0},
+        options={"seed": 0},
+        folders=[f"shape{row}" for row in range(3)],
+    )
+    return SampleStore.open(tmp_path)
+
+
+def drawn(path: Path, seed: int) -> Draw:
+    return SampleStore.open(path).draw([0, 1, 2], 10, 20, 5, np.random.default_rng(seed))
+
+
+def test_what_was_written_is_read(store):
+    assert (store.name, len(store), store.source["population"]) == ("test", 3, "airway")
+    assert store.frame == Frame((1.0, 2.0, 3.0), 40.0)
+    assert store.alignment.reference == {"cords": (0.0, 0.0, 0.0)}
+    assert store.population.names == ("age",)
+    assert store.mesh(2).bounds[1].max() == pytest.approx(3.0)
+    assert store.samples(1).near.shape == (80, 4)
+
+
+def test_a_draw_has_the_asked_shapes_of_the_asked_rows(store):
+    draw = store.draw([2, 0], 10, 20, 5, np.random.default_rng(0))
+    assert draw.surface_points.shape == draw.surface_normals.shape == (2, 10, 3)
+    assert draw.space_points.shape == (2, 25, 3)
+    assert draw.space_sdf.shape == (2, 25)
+    assert {a.dtype for a in draw} == {np.dtype(np.float32)}
+    for i, row in enumerate((2, 0)):
+        assert set(draw.surface_points[i].ravel() // 100) == {10 * row}
+        assert set(draw.space_sdf[i, :20] // 100) == {10 * row + 1}
+        assert set(draw.space_sdf[i, 20:] // 100) == {10 * row + 2}
+    assert len(np.unique(draw.space_sdf)) == 50
+
+
+def test_only_the_generator_decides_what_is_drawn(store):
+    first, again, other = drawn(store.path, 1), drawn(store.path, 1), drawn(store.path, 2)
+    np.testing.assert_array_equal(first.space_sdf, again.space_sdf)
+    assert not np.array_equal(first.space_sdf, other.space_sdf)
+
+
+def test_every_sample_is_drawn_sooner_or_later(store):
+    rng = np.random.default_rng(0)
+    seen = {float(v) for _ in range(400) for v in store.draw([0], 10, 20, 5, rng).space_sdf.ravel()}
+    assert len(seen) == 110
+    everything = store.draw([1], 50, 80, 30, rng)
+    assert len(np.unique(everything.space_sdf)) == 110
+
+
+def test_several_processes_read_the_same_store(store):
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        draws = list(
+            pool.map(
+                store.draw, [[0, 1]] * 4, [10] * 4, [20] * 4, [5] * 4, map(np.random.default_rng, range(4))
+            )
+        )
+    for seed, draw in enumerate(draws):
+        here = store.draw([0, 1], 10, 20, 5, np.random.default_rng(seed))
+        np.testing.assert_array_equal(draw.space_points, here.space_points)
+
+
+def test_asking_for_too_much_is_explained(store):
+    with pytest.raises(InputError, match="81 near samples were asked for but the store has 80"):
+        store.draw([0], 10, 81, 5, np.random.default_rng(0))
+
+
+def test_what_is_no_store_is_explained(store, tmp_path):
+    with pytest.raises(InputError, match="not a finished sample store"):
+        SampleStore.open(tmp_path / "elsewhere")
+    index = store.path / "store.json"
+    record = json.loads(index.read_text())
+    index.write_text(json.dumps(record | {"version": 99}))
+    with pytest.raises(InputError, match="newer version"):
+        SampleStore.open(store.path)
+    index.write_text(index.read_text()[:40])
+    with pytest.raises(InputError, match="damaged"):
+        SampleStore.open(store.path)
