@@ -21,6 +21,8 @@ TORCH_INDEX ?= https://download.pytorch.org/whl/cpu
 endif
 endif
 
+TORCH_ARGS = --no-deps $(if $(TORCH_INDEX),--retries 1 --timeout 15 --index-url $(TORCH_INDEX)) $(PIP_ARGS)
+
 # What Qt 6, VTK and a virtual display need of the system: library or program = Debian package.
 SYSTEM_NEEDS := \
 	Xvfb=xvfb xauth=xauth \
@@ -45,8 +47,8 @@ $(STAMP): pyproject.toml requirements.lock
 	@$(BIN)/python -m pip --version >/dev/null 2>&1 || $(PYTHON) -m venv $(VENV)
 	@echo "Installing the libraries into $(VENV): about 3 GB, a few minutes the first time ..."
 ifneq ($(TORCH_INDEX),)
-	@$(PIP) --retries 1 --timeout 15 --no-deps --index-url $(TORCH_INDEX) $(PIP_ARGS) \
-	  "$$(grep '^torch==' requirements.lock)" || echo "$(TORCH_INDEX) has no torch for us; using pip's own index."
+	@$(PIP) $(TORCH_ARGS) "$$(grep '^torch==' requirements.lock)" || \
+	  echo "$(TORCH_INDEX) has no torch for us; using pip's own index."
 endif
 	@$(PIP) $(PIP_ARGS) -r requirements.lock
 	@$(PIP) $(PIP_ARGS) --no-deps -e .
@@ -96,11 +98,11 @@ lint: env ## check format, style and types
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy
 
-lock: ## write requirements.lock anew from the ranges in pyproject.toml
+lock: ## write requirements.lock anew from the ranges in pyproject.toml; torch stays where it is
 	@fresh="$$(mktemp -d)"; trap 'rm -rf "$$fresh"' EXIT; set -e; \
 	$(PYTHON) -m venv "$$fresh"; \
-	"$$fresh/bin/python" -m pip install --quiet $(if $(TORCH_INDEX),--extra-index-url $(TORCH_INDEX)) \
-	  $(PIP_ARGS) '.[test,bodies]'; \
+	"$$fresh/bin/python" -m pip install --quiet $(TORCH_ARGS) "$$(grep '^torch==' requirements.lock)"; \
+	"$$fresh/bin/python" -m pip install --quiet $(PIP_ARGS) '.[test,bodies]'; \
 	{ sed -n '/^#/p' requirements.lock; \
 	  "$$fresh/bin/python" -m pip freeze --all --exclude pip --exclude naisr-atlas-explorer | \
 	    sed -e '/^\(nvidia\|cuda\|triton\)/d' -e 's/+[a-z0-9]*$$//'; \

@@ -7,7 +7,7 @@ import dataclasses
 import json
 import signal
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -334,10 +334,15 @@ def _stoppable() -> Iterator[Callable[[], bool]]:
         signal.signal(signal.SIGINT, previous)
 
 
-def main() -> int:
-    """Entry point: 0 on success, 2 for input that cannot be used, 130 when stopped by the user."""
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point for the words after ``naisr`` (left out: the command line's): 0 on success, 2 for input that cannot be used, 130 when stopped by the user."""
     try:
-        app(result_action="return_value", exit_on_error=False, print_error=False)
+        app(
+            sys.argv[1:] if arguments is None else arguments,
+            result_action="return_value",
+            exit_on_error=False,
+            print_error=False,
+        )
     except (InputError, CycloptsError) as error:
         print(f"naisr: {error}", file=sys.stderr)
         return 2

@@ -121,6 +121,11 @@ class TrainingConfig:
     seed: int = 0
     loss: LossWeights = field(default_factory=LossWeights)
 
+    @property
+    def shape_points(self) -> int:
+        """Points of one shape in a batch."""
+        return self.surface_points + self.near_points + self.uniform_points
+
 
 @dataclass(frozen=True)
 class Preset:
@@ -169,12 +174,12 @@ PRESETS: dict[str, Preset] = {
             displacement=SirenConfig(width=128, hidden=2, omega0=3.0),
         ),
         TrainingConfig(
-            epochs=220,
-            batch_shapes=16,
-            surface_points=256,
-            near_points=128,
-            uniform_points=128,
-            network_rate=4e-4,
+            epochs=300,
+            batch_shapes=8,
+            surface_points=128,
+            near_points=64,
+            uniform_points=64,
+            network_rate=5e-4,
             latent_rate=2e-3,
             cosine=True,
             population_share=0.25,

@@ -23,7 +23,7 @@ POINTS = np.array([[0, 0, 0], [0, -5, -90], [5, 40, 80], [0, 12, 25], [-8, 20, 4
 
 
 def named(points) -> dict[str, tuple[float, float, float]]:
-    return {name: tuple(map(float, point)) for name, point in zip(NAMES, points, strict=True)}
+    return {name: (float(x), float(y), float(z)) for name, (x, y, z) in zip(NAMES, points, strict=True)}
 
 
 def moved(points, rng, degrees=25.0):

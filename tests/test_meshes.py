@@ -99,7 +99,7 @@ def test_an_inside_out_neighbour_is_turned_but_a_cavity_is_kept():
     expected = outer.volume - cavity.volume + neighbour.volume
     cavity.invert()
     neighbour.invert()
-    mesh = repair_mesh(trimesh.util.concatenate([outer, cavity, neighbour]))
+    mesh = repair_mesh(outer + cavity + neighbour)
     assert mesh.volume == pytest.approx(expected)
     assert check_mesh(mesh) == ("3 components",)
 
@@ -123,3 +123,11 @@ def test_what_bounds_no_body_is_rejected(ellipsoid):
         check_mesh(repair_mesh(ellipsoid))
     with pytest.raises(InputError, match="no faces"):
         check_mesh(trimesh.Trimesh())
+
+
+def test_islands_between_missing_faces_keep_their_side(ellipsoid):
+    keep = np.random.default_rng(1).random(len(ellipsoid.faces)) > 0.4
+    ellipsoid.update_faces(keep)
+    mesh = repair_mesh(ellipsoid)
+    outward = np.einsum("ij,ij->i", mesh.face_normals, mesh.triangles_center - [3.0, -2.0, 50.0])
+    assert (outward > 0).all()

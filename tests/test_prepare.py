@@ -72,7 +72,7 @@ def test_a_cohort_becomes_a_store_in_one_frame(cohort, tmp_path):
     fractions: list[float] = []
     report = prepare(cohort, tmp_path / "store", options=SMALL, progress=fractions.append)
     assert report.accepted == tuple(range(2, 12))
-    assert report.skipped == report.rejected == report.warnings == ()
+    assert (report.skipped, report.rejected, report.warnings) == ((), (), ())
     assert fractions == sorted(fractions)
     assert fractions[-1] == pytest.approx(1.0)
 
@@ -186,13 +186,13 @@ def test_a_cancelled_run_goes_on_later(cohort, tmp_path, workers):
     assert contents(tmp_path / "cut") == contents(tmp_path / "whole")
 
 
-KILLED = PrepareOptions(surface_samples=20_000, near_samples=60_000, uniform_samples=20_000, workers=2)
+KILLED = PrepareOptions(surface_samples=5_000, near_samples=20_000, uniform_samples=5_000, workers=2)
 PROGRAM = """
 import sys
 from naisr_model.data.prepare import PrepareOptions, prepare
 
 if __name__ == "__main__":
-    options = PrepareOptions(surface_samples=20_000, near_samples=60_000, uniform_samples=20_000, workers=2)
+    options = PrepareOptions(surface_samples=5_000, near_samples=20_000, uniform_samples=5_000, workers=2)
     prepare(sys.argv[1], sys.argv[2], options=options)
 """
 

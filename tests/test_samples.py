@@ -99,7 +99,8 @@ def test_samples_are_in_model_units_with_outward_normals(torus_mm, frame):
     gradient = (torus_distance(points + 1e-3 * normals) - torus_distance(points - 1e-3 * normals)) / 2e-3
     assert gradient.min() > 0.99
     for samples in (taken.near, taken.uniform):
-        np.testing.assert_allclose(samples[:, 3], torus_distance(samples[:, :3]), atol=FACETS)
+        exact = samples.astype(np.float64)
+        np.testing.assert_allclose(exact[:, 3], torus_distance(exact[:, :3]), atol=FACETS)
 
 
 def test_near_samples_hug_the_surface_and_uniform_ones_fill_the_box(torus_mm, frame):

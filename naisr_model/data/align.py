@@ -25,9 +25,9 @@ Method = Literal["none", "icp", "landmarks"]
 METHODS: tuple[str, ...] = get_args(Method)
 Landmarks = Mapping[str, tuple[float, float, float]]
 
-REFERENCE_POINTS = 2000
+REFERENCE_POINTS = 1000
 ICP_ITERATIONS = 200
-ICP_TOLERANCE_MM = 1e-3
+ICP_TOLERANCE_MM = 2e-3
 PROCRUSTES_ITERATIONS = 10
 
 
@@ -168,10 +168,11 @@ def _closest_point_transform(alignment: Alignment, mesh_mm: trimesh.Trimesh) -> 
     faces = np.ascontiguousarray(mesh_mm.faces, dtype=np.int64)
     reference = np.array(list(alignment.reference.values()))
     scan = np.asarray(trimesh.sample.sample_surface(mesh_mm, len(reference), seed=0)[0])
-    tree = cKDTree(reference)
+    tree, surface = cKDTree(reference), igl.AABB()
+    surface.init(vertices, faces)
     rotation, shift_mm = np.eye(3), reference.mean(axis=0) - scan.mean(axis=0)
     for _ in range(ICP_ITERATIONS):
-        on_scan = igl.point_mesh_squared_distance((reference - shift_mm) @ rotation, vertices, faces)[2]
+        on_scan = surface.squared_distance(vertices, faces, (reference - shift_mm) @ rotation)[2]
         on_reference = reference[tree.query(scan @ rotation.T + shift_mm)[1]]
         points, goals = np.concatenate([on_scan, scan]), np.concatenate([reference, on_reference])
         centre, goal = points.mean(axis=0), goals.mean(axis=0)

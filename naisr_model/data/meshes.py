@@ -6,6 +6,7 @@ Coordinates are taken as millimetres whatever the format says.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import NamedTuple
 
 import igl
 import numpy as np
@@ -87,10 +88,13 @@ def repair_mesh(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
 
 
 def _face_outward(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Turn round the components whose faces look inward, ``faces`` being consistently wound."""
-    count, component = igl.facet_components(faces)
-    volumes = np.array([_volume(vertices, faces[component == i]) for i in range(count)])
-    inward = volumes < 0
+    """Turn round the components whose faces look inward, ``faces`` being consistently wound.
+
+    Open patches, such as the islands between missing faces, have no inside and are left alone.
+    """
+    component = igl.facet_components(faces)[1]
+    bulk = _bulk(vertices, faces, component)
+    inward = (bulk.volume < 0) & (bulk.opening <= OPEN_SHARE)
     positive = np.where(inward[component][:, None], faces[:, ::-1], faces)
     for i in np.flatnonzero(inward):
         others = positive[component != i]
@@ -99,10 +103,29 @@ def _face_outward(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> ND
     return np.where(inward[component][:, None], faces[:, ::-1], faces)
 
 
-def _volume(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> float:
-    """Signed volume about the faces' own centre, so that open patches have a sensible sign too."""
-    corners = vertices[faces] - vertices[faces].mean(axis=(0, 1))
-    return float(np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))) / 6
+class _Bulk(NamedTuple):
+    """Of each group of faces: signed volume, area, and the opening that :data:`OPEN_SHARE` limits."""
+
+    volume: NDArray[np.float64]
+    area: NDArray[np.float64]
+    opening: NDArray[np.float64]
+
+
+def _bulk(vertices: NDArray[np.float64], faces: NDArray[np.int64], group: NDArray[np.int64]) -> _Bulk:
+    corners = vertices[faces]
+    vectors = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
+    middles = corners.mean(axis=1)
+    # About the group's own centre, so that a small hole changes the volume little.
+    centres = _sums(middles, group) / np.bincount(group)[:, None]
+    heights = np.einsum("ij,ij->i", middles - centres[group], vectors)
+    area = _sums(np.linalg.norm(vectors, axis=1)[:, None], group)[:, 0]
+    opening = np.linalg.norm(_sums(vectors, group), axis=1) / np.maximum(area, np.finfo(float).tiny)
+    return _Bulk(_sums(heights[:, None], group)[:, 0] / 3, area, opening)
+
+
+def _sums(rows: NDArray[np.float64], group: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Sum the rows of each group, ``[n, k] -> [groups, k]``."""
+    return np.stack([np.bincount(group, weights=column) for column in rows.T], axis=1)
 
 
 def _winding(
@@ -123,12 +146,10 @@ def check_mesh(mesh: trimesh.Trimesh) -> tuple[str, ...]:
     if not len(mesh.faces):
         raise InputError("the mesh has no faces; check how it was exported")
     vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
-    area_vectors = np.cross(*np.moveaxis(np.diff(vertices[faces], axis=1), 1, 0)) / 2
-    area = float(np.linalg.norm(area_vectors, axis=1).sum())
-    opening = float(np.linalg.norm(area_vectors.sum(axis=0))) / area if area else 1.0
-    if opening > OPEN_SHARE:
-        raise InputError(f"the surface is open (opening {opening:.0%} of its area); close its holes first")
-    if _volume(vertices, faces) < FLAT_SHARE * area**1.5 / (6 * np.sqrt(np.pi)):
+    bulk = _bulk(vertices, faces, np.zeros(len(faces), dtype=np.int64))
+    if bulk.opening[0] > OPEN_SHARE:
+        raise InputError(f"the surface is open (opening {bulk.opening[0]:.0%} of its area); close its holes")
+    if bulk.volume[0] < FLAT_SHARE * bulk.area[0] ** 1.5 / (6 * np.sqrt(np.pi)):
         raise InputError("the surface encloses no volume; it must bound a body")
     return _oddities(faces)
 

@@ -143,36 +143,22 @@ def prepare(
         InputError: when the table cannot be used or no mesh can.
         Cancelled: when ``should_stop()`` turned true.
     """
-    options = options or PrepareOptions()
-    out = Path(out)
+    options, out = options or PrepareOptions(), Path(out)
     table = _checked_table(csv, options)
     (out / store.SHAPES).mkdir(parents=True, exist_ok=True)
     held_out = held_out_mask([row.subject for row in table.rows], options.held_out, options.seed)
     with _runner(options.workers, should_stop) as run:
-        inputs = run(
-            _inspect, [(row, table.alignment.method) for row in table.rows], _share(progress, 0.0, 0.05)
-        )
+        looks = [(row, table.alignment.method) for row in table.rows]
+        inputs = run(_inspect, looks, _share(progress, 0.0, 0.05))
         alignment = _reference(table, inputs, held_out)
-        jobs = [(alignment, row.mesh, item) for row, item in zip(table.rows, inputs, strict=True)]
-        placed = run(_place, jobs, _share(progress, 0.05, 0.1))
-        usable = [i for i, item in enumerate(placed) if not item.reason]
-        rejected = [_remark(table.rows[i], item.reason) for i, item in enumerate(placed) if item.reason]
-        if not usable:
-            raise InputError(
-                f"no mesh of {Path(csv).name} can be used; the first reason, row {rejected[0].row}: "
-                f"{rejected[0].reason}"
-            )
+        places = [(alignment, row.mesh, item) for row, item in zip(table.rows, inputs, strict=True)]
+        placed = run(_place, places, _share(progress, 0.05, 0.1))
+        usable = _usable(table, placed)
         population = tables.population_from_table(table.take(usable), held_out[usable])
-        bounds = np.array([placed[i].bounds_mm for i in usable])
-        frame = enclosing_frame(bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0))
-        todo = [_job(inputs[i].digest, placed[i], table.rows[i], frame, options, out) for i in usable]
-        done = run(_write_samples, todo, _share(progress, 0.1, 1.0))
-    report = PreparationReport(
-        accepted=tuple(table.rows[i].number for i in usable),
-        skipped=tuple(table.rows[i].number for i, new in zip(usable, done, strict=True) if not new),
-        rejected=tuple(rejected),
-        warnings=tuple(_remark(table.rows[i], "; ".join(w)) for i in usable if (w := inputs[i].warnings)),
-    )
+        frame = _common_frame([placed[i] for i in usable])
+        jobs = [_job(inputs[i].digest, placed[i], table.rows[i], frame, options, out) for i in usable]
+        written = run(_write_samples, jobs, _share(progress, 0.1, 1.0))
+    folders = [job.target.name for job in jobs]
     store.write_index(
         out,
         name=table.name,
@@ -181,11 +167,12 @@ def prepare(
         alignment=alignment,
         source=table.source,
         options={key: value for key, value in asdict(options).items() if key != "workers"},
-        folders=[job.target.name for job in todo],
+        folders=folders,
     )
+    _remove_strangers(out / store.SHAPES, set(folders))
+    report = _report(table, inputs, placed, dict(zip(usable, written, strict=True)))
     with replacing(out / REPORT) as temporary:
         temporary.write_text(json.dumps(report.to_json(), indent=1), encoding="utf-8")
-    _remove_strangers(out / store.SHAPES, {job.target.name for job in todo})
     return report
 
 
@@ -202,8 +189,21 @@ def _checked_table(csv: str | Path, options: PrepareOptions) -> ShapeTable:
     return table
 
 
-def _remark(row: TableRow, reason: str) -> Remark:
-    return Remark(row.number, str(row.mesh), reason)
+def _report(
+    table: ShapeTable, inputs: Sequence[_Input], placed: Sequence[_Placed], written: dict[int, bool]
+) -> PreparationReport:
+    """Sum up; ``written`` tells of each usable row whether this run sampled it."""
+
+    def remarks(reasons: Sequence[str]) -> tuple[Remark, ...]:
+        rows = zip(table.rows, reasons, strict=True)
+        return tuple(Remark(row.number, str(row.mesh), reason) for row, reason in rows if reason)
+
+    return PreparationReport(
+        accepted=tuple(table.rows[i].number for i in written),
+        skipped=tuple(table.rows[i].number for i, new in written.items() if not new),
+        rejected=remarks([item.reason for item in placed]),
+        warnings=remarks(["; ".join(inputs[i].warnings) if i in written else "" for i in range(len(inputs))]),
+    )
 
 
 def _share(progress: Progress | None, start: float, end: float) -> Progress | None:
@@ -276,6 +276,19 @@ def _write_samples(job: _Job) -> bool:
 
 
 # --- what lies between the stages ---------------------------------------------------------------
+
+
+def _usable(table: ShapeTable, placed: Sequence[_Placed]) -> list[int]:
+    if usable := [i for i, item in enumerate(placed) if not item.reason]:
+        return usable
+    raise InputError(
+        f"none of the {len(placed)} meshes can be used; row {table.rows[0].number}: {placed[0].reason}"
+    )
+
+
+def _common_frame(placed: Sequence[_Placed]) -> Frame:
+    bounds_mm = np.array([item.bounds_mm for item in placed])
+    return enclosing_frame(bounds_mm[:, 0].min(axis=0), bounds_mm[:, 1].max(axis=0))
 
 
 def _reference(table: ShapeTable, inputs: Sequence[_Input], held_out: NDArray[np.bool_]) -> Alignment:

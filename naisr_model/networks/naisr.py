@@ -36,6 +36,7 @@ class Naisr(nn.Module):
             outputs=config.dim,
             conditions=1 + config.latent,
             skipped=1,
+            output_scale=0.01,  # the template is found undeformed before it is deformed
         )
 
     def template(self, points: Tensor) -> Tensor:
@@ -44,7 +45,7 @@ class Naisr(nn.Module):
         return distance[0, :, :, 0]
 
     def displacements(self, points: Tensor, covariates: Tensor, latents: Tensor) -> Tensor:
-        """All g_i, ``[N, shapes, n, dim]``; exactly 0 where c_i = 0."""
+        """All g_i, ``[N, shapes, n, dim]``; 0 to rounding where c_i = 0."""
         codes = latents.expand(covariates.shape[1], *latents.shape)
         at_value = torch.cat([covariates.T[..., None], codes], dim=-1)
         at_zero = torch.cat([torch.zeros_like(covariates).T[..., None], codes], dim=-1)

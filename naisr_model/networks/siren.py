@@ -12,13 +12,12 @@ from typing import Any
 
 import torch
 from torch import Tensor, nn
-from torch.autograd.function import once_differentiable
 
 from naisr_model.config import SirenConfig
 
 
 class _Sine(torch.autograd.Function):
-    """sin, twice differentiable, with the cosine kept for the backward pass.
+    """sin, as often differentiable as torch's, with the cosine kept for the backward pass.
 
     Training differentiates twice (the eikonal term). Plain ``torch.sin`` evaluates four trigonometric
     functions an element for that, this two; on a CPU they cost as much as the matrix products.
@@ -40,14 +39,15 @@ class _SineBackward(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx: Any, outer: Tensor, angle: Tensor, sine: Tensor, cosine: Tensor) -> Tensor:
-        ctx.save_for_backward(outer, sine, cosine)
+        ctx.save_for_backward(outer, angle, sine, cosine)
         return outer * cosine
 
     @staticmethod
-    @once_differentiable  # a third derivative would be wrong, so asking for one must fail
     def backward(ctx: Any, *gradients: Tensor) -> Any:
-        outer, sine, cosine = ctx.saved_tensors
-        return gradients[0] * cosine, (gradients[0] * outer).mul_(sine).neg_(), None, None
+        outer, angle, sine, cosine = ctx.saved_tensors
+        if torch.is_grad_enabled():  # somebody differentiates on: the kept values would be constants
+            sine, cosine = torch.sin(angle), torch.cos(angle)
+        return gradients[0] * cosine, -(gradients[0] * outer * sine), None, None
 
 
 def sine(angle: Tensor) -> Tensor:
@@ -62,17 +62,27 @@ class SirenStack(nn.Module):
     ``skipped`` entries of that vector, together with the point, feed the middle layer again
     (the paper's skip of (p, c_i)).
 
-    Initialisation: first layer U(-1/D_in, 1/D_in), later layers U(+-sqrt(6/D_in)/omega0).
+    Initialisation: first layer U(-1/D_in, 1/D_in), later layers U(+-sqrt(6/D_in)/omega0). D_in of the
+    first layer counts the point and the skipped conditions only: latent codes start near 0, and
+    counting their many entries would leave the network almost blind to where it is and to c_i.
+    ``output_scale`` shrinks the last layer, so that a network can start near 0.
     """
 
     def __init__(
-        self, config: SirenConfig, stack: int, dim: int, outputs: int, conditions: int = 0, skipped: int = 0
+        self,
+        config: SirenConfig,
+        stack: int,
+        dim: int,
+        outputs: int,
+        conditions: int = 0,
+        skipped: int = 0,
+        output_scale: float = 1.0,
     ) -> None:
         super().__init__()
         self.omega0 = config.omega0
         self.middle = config.hidden // 2
         width = config.width
-        first = 1 / (dim + conditions)
+        first = 1 / (dim + skipped)
         later = math.sqrt(6 / width) / config.omega0
         self.point_weight = _uniform(first, stack, width, dim)
         self.condition_weight = _uniform(first, stack, width, conditions)
@@ -81,7 +91,7 @@ class SirenStack(nn.Module):
         self.hidden_bias = _uniform(1 / math.sqrt(width), config.hidden, stack, width)
         self.skip_point_weight = _uniform(later, stack, width, dim if skipped else 0)
         self.skip_condition_weight = _uniform(later, stack, width, skipped)
-        self.last_weight = _uniform(later, stack, outputs, width)
+        self.last_weight = _uniform(output_scale * later, stack, outputs, width)
         self.last_bias = _uniform(1 / math.sqrt(width), stack, outputs)
 
     def forward(self, points: Tensor, conditions: Tensor | None = None) -> Tensor:

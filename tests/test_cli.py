@@ -1,0 +1,111 @@
+"""The command line as a user types it: a CSV and a folder of STL files become an atlas and a mesh."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+import trimesh
+from eggs import egg
+
+from naisr_model import cli
+
+SETTINGS = """
+[network]
+latent = 4
+template = {width = 32, hidden = 1, omega0 = 5.0}
+displacement = {width = 16, hidden = 1, omega0 = 2.0}
+[training]
+batch_shapes = 10
+network_rate = 2e-3
+"""
+
+
+@pytest.fixture
+def naisr(capsys):
+    """``naisr(...)`` runs the command and gives exit code, standard output and standard error."""
+
+    def run(*words):
+        code = cli.main([str(word) for word in words])
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return run
+
+
+def test_from_a_table_of_stl_files_to_a_mesh(naisr, egg_table, tmp_path):
+    store, atlas, settings = tmp_path / "store", tmp_path / "mine.safetensors", tmp_path / "small.toml"
+    settings.write_text(SETTINGS)
+    counts = ["--surface-samples", 500, "--near-samples", 500, "--uniform-samples", 500, "--workers", 1]
+    code, out, _ = naisr("prepare", egg_table, "--out", store, *counts)
+    assert code == 0 and "24 shapes" in out and "0 rejected" in out
+    code, out, _ = naisr("prepare", egg_table, "--out", store, *counts)
+    assert "24 were there already" in out
+    code, out, _ = naisr(
+        "train", store, "--preset", "demo", "--config", settings, "--out", atlas, "--epochs", 2
+    )
+    assert code == 0 and "after 4 iterations" in out and "folded points" in out
+    code, out, _ = naisr("info", atlas)
+    assert code == 0 and "age: 1 years to" in out and "24 shapes of 24 subjects" in out
+
+
+def test_a_mesh_of_the_atlas_is_written_in_millimetres(naisr, egg_atlas, tmp_path):
+    out = tmp_path / "eight.stl"
+    code, said, _ = naisr("mesh", egg_atlas, out, "--set", "age=8", "--set", "sex=M", "--resolution", 64)
+    written, truth = trimesh.load_mesh(out), egg(8, 1)
+    assert code == 0 and written.is_watertight and f"{written.volume / 1000:.2f} cm³" in said
+    assert written.extents == pytest.approx(truth.extents, rel=0.1)
+    assert naisr("mesh", egg_atlas, tmp_path / "t.ply", "--template", "--resolution", 32)[0] == 0
+    code, _, _ = naisr("mesh", egg_atlas, tmp_path / "a.obj", "--effect", "age", "--set", "age=2")
+    assert code == 0 and len(trimesh.load_mesh(tmp_path / "a.obj").faces) > 1000
+
+
+def test_evaluating_shapes_of_one_s_own(naisr, egg_atlas, egg_store, tmp_path):
+    target = tmp_path / "figures.json"
+    code, out, _ = naisr(
+        "evaluate", "reconstruction", egg_atlas, "--store", egg_store.path,
+        "--json", target, "--steps", 30, "--limit", 2,
+    )  # fmt: skip
+    figures = json.loads(target.read_text())
+    assert code == 0 and "cm³" in out and figures["n"] == 2
+    assert 0 < figures["cd_x100"]["mean"] < 5 and 0 < figures["hd_x100"]["median"] < 30
+    assert figures["components"] == [1, 1] and figures["folded_share"] < 0.05
+    assert figures["truth_volume_error"] == {}
+    code, _, error = naisr("evaluate", "reconstruction", egg_atlas)
+    assert code == 2 and "--store" in error
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["mesh", "ATLAS", "x.stl", "--set", "age=99"], "the atlas was trained on 1 to"),
+        (["mesh", "ATLAS", "x.stl", "--set", "age=old"], "expected a number in years"),
+        (["mesh", "ATLAS", "x.stl", "--set", "length=1"], "NAME=VALUE with one of age, sex"),
+        (["mesh", "ATLAS", "x.doc"], "name the file .stl, .ply, .obj or .glb"),
+        (["mesh", "ATLAS", "x.stl", "--effect", "age"], "--set age=VALUE"),
+        (["mesh", "nowhere.safetensors", "x.stl"], "there is no atlas at"),
+        (["train", "nowhere", "--out", "x.safetensors"], "run 'naisr prepare' first"),
+        (["train", "STORE", "--out", "x.safetensors", "--preset", "huge"], "there is no preset 'huge'"),
+        (["train", "STORE", "--out", "x.safetensors", "--time-budget", "soon"], "write it as 90s"),
+        (["prepare", "nowhere.csv", "--out", "x"], "nowhere.csv"),
+        (["populate", "moon", "x"], "unknown population 'moon'"),
+        (["fly"], "fly"),
+    ],
+)
+def test_bad_input_gets_one_sentence_and_exit_code_2(
+    naisr, egg_atlas, egg_store, tmp_path, monkeypatch, words, message
+):
+    monkeypatch.chdir(tmp_path)
+    there = {"ATLAS": egg_atlas, "STORE": egg_store.path}
+    code, _, error = naisr(*(there.get(word, word) for word in words))
+    assert code == 2 and message in error and "Traceback" not in error
+    assert not list(tmp_path.iterdir())
+
+
+def test_help_is_there_without_heavy_imports():
+    probe = (
+        "import sys; from naisr_model import cli\n"
+        "try: cli.main(['--help'])\nfinally: assert 'torch' not in sys.modules and 'pyvista' not in sys.modules"
+    )
+    done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
+    assert all(word in done.stdout for word in ("prepare", "train", "mesh", "evaluate", "info"))

@@ -1,0 +1,76 @@
+"""Every loss term where its value is known in closed form."""
+
+import numpy as np
+import pytest
+import torch
+
+from naisr_model.config import LossWeights, NetworkConfig, SirenConfig
+from naisr_model.learning import losses
+from naisr_model.learning.objective import population_terms
+from naisr_model.learning.residual import smooth_basis
+from naisr_model.learning.train import residual_latents
+from naisr_model.networks.naisr import Naisr
+
+
+def test_a_sphere_s_distance_has_no_loss():
+    points = torch.randn(2, 50, 3, dtype=torch.float64)
+    unit = points / points.norm(dim=-1, keepdim=True)
+    assert losses.eikonal(unit) == pytest.approx(0, abs=1e-12)
+    assert losses.distance(points.norm(dim=-1) - 1, points.norm(dim=-1) - 1) == 0
+    assert losses.normal(unit, unit) == pytest.approx(0, abs=1e-12)
+
+
+def test_known_errors_have_known_losses():
+    slope = torch.tensor([[[3.0, 4.0, 0.0], [0.0, 0.5, 0.0]]])
+    assert losses.eikonal(slope) == pytest.approx((4 + 0.5) / 2)
+    assert losses.distance(torch.tensor([0.2, -0.4]), 0.0) == pytest.approx(0.3)
+    normals = torch.tensor([[[-3.0, -4.0, 0.0], [1.0, 0.0, 0.0]]])
+    assert losses.normal(slope, normals) == pytest.approx((2 + 1) / 2)
+    assert losses.latent_prior(torch.full((3, 4), 0.02), sigma=0.01) == pytest.approx(4)
+
+
+def test_centring_ignores_an_antisymmetric_effect_and_ridge_does_not():
+    plus = torch.randn(2, 9, 3)
+    assert losses.centring(-plus, plus) == 0
+    assert losses.centring(plus, plus) == pytest.approx(float(losses.ridge(plus)))
+
+
+def test_folding_counts_only_negative_determinants():
+    assert losses.folding(torch.tensor([1.0, 0.2, -0.6])) == pytest.approx(0.2)
+
+
+def test_population_terms_push_the_template_to_the_middle_of_the_levels():
+    config = NetworkConfig(latent=2, template=SirenConfig(8, 1, 5.0), displacement=SirenConfig(8, 1, 3.0))
+    torch.manual_seed(0)
+    network = Naisr(config, covariates=2)
+    points, covariates = torch.rand(2, 30, 3), torch.tensor([[0.5, 1.0], [-0.2, -1.0]])
+    weights = LossWeights(centring=1.0)
+    optimiser = torch.optim.Adam(network.parameters(), 1e-2)
+
+    def offset():
+        return population_terms(network, points, covariates, (1,), weights)["centring"]
+
+    before = float(offset().detach())
+    for _ in range(100):
+        optimiser.zero_grad()
+        offset().backward()
+        optimiser.step()
+    assert float(offset().detach()) < 0.05 * before
+
+
+def test_residual_codes_are_uncorrelated_with_smooth_functions_of_the_covariates():
+    rng = np.random.default_rng(0)
+    age, sex = rng.normal(size=200), rng.choice([-1.0, 1.0], 200)
+    basis = smooth_basis(np.stack([age, sex], axis=1), binary=(1,))
+    assert basis.T @ basis == pytest.approx(np.eye(basis.shape[1]), abs=1e-9)
+    codes = torch.as_tensor(np.stack([2 * age**2 + sex, rng.normal(size=200)], axis=1))
+    residual = residual_latents(codes, torch.as_tensor(basis)).numpy()
+    assert residual[:, 0] == pytest.approx(0, abs=1e-9)
+    assert residual[:, 1].std() > 0.8
+    for function in (np.ones(200), age, age**3, sex, age * sex):
+        assert function @ residual == pytest.approx(0, abs=1e-9)
+
+
+def test_a_small_population_keeps_codes_to_spare():
+    basis = smooth_basis(np.random.default_rng(0).normal(size=(10, 3)), binary=())
+    assert basis.shape[1] <= 2

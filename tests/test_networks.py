@@ -1,0 +1,126 @@
+"""The networks against a plain, slow transcription of the paper's equations, in float64."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import torch
+
+from naisr_model.config import PRESETS, NetworkConfig, SirenConfig
+from naisr_model.networks.calculus import deformation_determinant, gradient, jacobian
+from naisr_model.networks.naisr import Naisr
+from naisr_model.networks.siren import sine
+
+SMALL = NetworkConfig(
+    latent=5, template=SirenConfig(16, 2, omega0=4.0), displacement=SirenConfig(12, 3, omega0=2.0)
+)
+
+
+def make(dim=3, covariates=2):
+    torch.manual_seed(0)
+    return Naisr(dataclasses.replace(SMALL, dim=dim), covariates).double()
+
+
+def arguments(dim=3, covariates=2, shapes=3, points=7):
+    generator = torch.Generator().manual_seed(1)
+
+    def random(*size):
+        return torch.randn(size, generator=generator, dtype=torch.float64)
+
+    return random(shapes, points, dim), random(shapes, covariates), random(shapes, SMALL.latent)
+
+
+def plain_siren(net, index, point, condition):
+    """One network of a stack on one point: the layer equations written out, nothing shared."""
+    omega0, skip = net.omega0, condition[: net.skip_condition_weight.shape[-1]]
+    first = torch.cat([net.point_weight[index], net.condition_weight[index]], dim=1)
+    state = torch.sin(omega0 * (first @ torch.cat([point, condition]) + net.first_bias[index]))
+    for layer in range(len(net.hidden_weight)):
+        linear = net.hidden_weight[layer, index] @ state + net.hidden_bias[layer, index]
+        if layer == net.middle and len(condition):
+            again = torch.cat([net.skip_point_weight[index], net.skip_condition_weight[index]], dim=1)
+            linear = linear + again @ torch.cat([point, skip])
+        state = torch.sin(omega0 * linear)
+    return net.last_weight[index] @ state + net.last_bias[index]
+
+
+def plain_displacement(network, index, point, value, latent):
+    at = [torch.cat([torch.stack([v]), latent]) for v in (value, torch.zeros_like(value))]
+    f_value, f_zero = (plain_siren(network.displacement_networks, index, point, c) for c in at)
+    return f_value - f_zero
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_full_shape_and_effects_follow_the_equations_of_the_paper(dim):
+    network, (points, covariates, latents) = make(dim), arguments(dim)
+    values, displacement = network(points, covariates, latents)
+    effects = [network.effect(i, points, covariates, latents) for i in range(2)]
+    nothing = torch.zeros(0, dtype=torch.float64)
+    for s in range(3):
+        for n in range(7):
+            p, z = points[s, n], latents[s]
+            g = [plain_displacement(network, i, p, covariates[s, i], z) for i in range(2)]
+            template = [plain_siren(network.template_network, 0, p + d, nothing)[0] for d in (*g, sum(g))]
+            torch.testing.assert_close(displacement[s, n], sum(g))
+            torch.testing.assert_close(values[s, n], template[2])
+            torch.testing.assert_close(torch.stack([e[s, n] for e in effects]), torch.stack(template[:2]))
+
+
+def test_a_covariate_at_its_centre_displaces_nothing_whatever_the_code():
+    network, (points, covariates, latents) = make(), arguments()
+    covariates[:, 1] = 0
+    displacements = network.displacements(points, covariates, latents)
+    assert displacements[0].abs().max() > 1e-3
+    assert displacements[1].abs().max() < 1e-14
+
+
+def test_inference_gives_what_training_gives():
+    network, args = make(), arguments()
+    with torch.inference_mode():
+        inferred, _ = network(*args)
+    torch.testing.assert_close(inferred, network(*args)[0])
+
+
+@pytest.mark.parametrize(
+    ("preset", "covariates", "published"),
+    [("paper-airway", 3, 1.26e6), ("paper-hippocampus", 4, 2.26e6), ("paper-starman", 2, 1.33e6)],
+)
+def test_presets_have_the_published_number_of_parameters(preset, covariates, published):
+    network = Naisr(PRESETS[preset].network, covariates)
+    assert sum(p.numel() for p in network.parameters()) == pytest.approx(published, rel=0.01)
+
+
+def test_sine_is_twice_differentiable():
+    angle = torch.linspace(-4, 4, 9, dtype=torch.float64, requires_grad=True)
+    assert torch.autograd.gradcheck(sine, angle)
+    assert torch.autograd.gradgradcheck(sine, angle)
+
+
+def test_a_third_derivative_is_right_too():
+    angle = torch.linspace(-4, 4, 9, dtype=torch.float64, requires_grad=True)
+    derivative = sine(angle)
+    for _ in range(3):
+        derivative = torch.autograd.grad(derivative.sum(), angle, create_graph=True)[0]
+    torch.testing.assert_close(derivative, -torch.cos(angle))
+
+
+def test_gradients_agree_with_finite_differences():
+    network, (points, covariates, latents) = make(), arguments()
+    points.requires_grad_()
+    values, displacement = network(points, covariates, latents)
+    slope, bend = gradient(values, points), jacobian(displacement, points)
+    step = 1e-6
+    for axis in range(3):
+        shift = torch.zeros(3, dtype=torch.float64)
+        shift[axis] = step
+        (up, up_d), (down, down_d) = (network(points + s, covariates, latents) for s in (shift, -shift))
+        torch.testing.assert_close(slope[..., axis], (up - down) / (2 * step), atol=1e-6, rtol=1e-6)
+        torch.testing.assert_close(bend[..., axis], (up_d - down_d) / (2 * step), atol=1e-6, rtol=1e-6)
+
+
+def test_determinant_of_a_known_map():
+    matrix = torch.tensor([[0.2, 0.1, 0.0], [0.0, -1.5, 0.3], [0.4, 0.0, 0.5]], dtype=torch.float64)
+    points = torch.randn(1, 4, 3, dtype=torch.float64, requires_grad=True)
+    determinant = deformation_determinant(points @ matrix.T, points)
+    assert determinant.detach().numpy() == pytest.approx(np.linalg.det(np.eye(3) + matrix.numpy()))
+    assert (determinant < 0).all()

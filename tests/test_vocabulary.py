@@ -1,0 +1,104 @@
+"""Frames, covariates and settings."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from naisr_model.config import PRESETS, Preset, from_json, preset, read_toml, to_json
+from naisr_model.covariates import Covariate, Population, complete
+from naisr_model.errors import InputError
+from naisr_model.files import replacing
+from naisr_model.frames import Frame, enclosing_frame
+
+AGE = Covariate("age", "months", "continuous", centre=100.0, scale=50.0, range=(1.0, 233.0))
+SEX = Covariate("sex", "", "binary", 0.0, 1.0, (-1.0, 1.0), ("F", "M"))
+
+
+def test_frames_go_there_and_back():
+    frame = enclosing_frame([-10, 0, -100], [30, 50, 100])
+    points = np.random.default_rng(0).normal(size=(20, 3)) * 50
+    assert frame.to_mm(frame.to_model(points)) == pytest.approx(points)
+    assert np.abs(frame.to_model([[-10, 0, -100], [30, 50, 100]])).max() < 1
+    assert frame.to_model([10, 25, 0]) == pytest.approx(0)
+    assert Frame.from_json(frame.to_json()) == frame
+
+
+def test_a_covariate_reads_what_people_write():
+    assert AGE.parse(" 120 ") == 120 and SEX.parse("M") == 1 and SEX.parse("-0.5") == -0.5
+    assert AGE.normalise(200.0) == 2 and AGE.restore(2.0) == 200
+    assert AGE.format(120) == "120 months" and SEX.format(-1) == "F"
+    assert "between F and M" in SEX.format(0.2)
+    for bad in ("old", "nan", ""):
+        with pytest.raises(InputError, match="age"):
+            AGE.parse(bad)
+    with pytest.raises(InputError, match="F or M"):
+        SEX.parse("X")
+
+
+def test_missing_covariates_are_at_the_centre_and_others_are_checked():
+    assert complete((AGE, SEX), {"age": 12}) == {"age": 12.0, "sex": 0.0}
+    with pytest.raises(InputError, match=r"412 months.*1 to 233.*--extrapolate"):
+        complete((AGE, SEX), {"age": 412})
+    assert complete((AGE, SEX), {"age": 412}, extrapolate=True)["age"] == 412
+    with pytest.raises(InputError, match="unknown covariate 'height'"):
+        complete((AGE, SEX), {"height": 1})
+    with pytest.raises(InputError, match="finite"):
+        complete((AGE, SEX), {"age": float("nan")}, extrapolate=True)
+
+
+def test_a_population_survives_json():
+    population = Population(
+        (AGE, SEX), ("a", "b"), ("1", "1"), np.array([[12.0, -1], [120, 1]]), np.array([False, True])
+    )
+    again = Population.from_json(population.to_json())
+    assert again.covariates == population.covariates and (again.values == population.values).all()
+    assert again.observed("age").tolist() == [12.0]
+    assert again.row(1) == {"age": 120.0, "sex": 1.0}
+    assert again.normalised()[0] == pytest.approx([(12 - 100) / 50, -1])
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_presets_survive_json(name):
+    assert from_json(Preset, to_json(preset(name))) == preset(name)
+
+
+def test_settings_from_a_file_change_only_what_they_name(tmp_path):
+    path = tmp_path / "settings.toml"
+    path.write_text("[training]\nepochs = 7\n[training.loss]\nfolding = 1\n[network.template]\nwidth = 64\n")
+    read = read_toml(path, preset("demo"))
+    assert (read.training.epochs, read.training.loss.folding, read.network.template.width) == (7, 1.0, 64)
+    changed_back = dataclasses.replace(
+        read.training, epochs=preset("demo").training.epochs, loss=preset("demo").training.loss
+    )
+    assert changed_back == preset("demo").training
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[training]\nepoch = 7\n", "unknown setting 'training.epoch'"),
+        ("[training]\nepochs = 'many'\n", "'training.epochs' is 'many'; expected int"),
+        ("training = 3\n", "'training' is 3; expected a table"),
+        ("[training\n", "cannot read"),
+    ],
+)
+def test_wrong_settings_are_named(tmp_path, text, message):
+    path = tmp_path / "settings.toml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=message):
+        read_toml(path, preset("demo"))
+    with pytest.raises(InputError, match="choose one of"):
+        preset("huge")
+
+
+def test_a_failed_write_leaves_what_was_there(tmp_path):
+    path = tmp_path / "kept.txt"
+    path.write_text("old")
+    with pytest.raises(RuntimeError), replacing(path) as temporary:
+        temporary.write_text("half")
+        raise RuntimeError
+    assert path.read_text() == "old" and list(tmp_path.iterdir()) == [path]
+    with replacing(path) as temporary:
+        temporary.write_text("new")
+    assert path.read_text() == "new"
