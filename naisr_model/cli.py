@@ -335,7 +335,14 @@ def _stoppable() -> Iterator[Callable[[], bool]]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point for the words after ``naisr`` (left out: the command line's): 0 on success, 2 for input that cannot be used, 130 when stopped by the user."""
+    """Entry point.
+
+    Args:
+        arguments: the words after ``naisr``; left out, those of the command line.
+
+    Returns:
+        0 on success, 2 for input that cannot be used, 130 when stopped by the user.
+    """
     try:
         app(
             sys.argv[1:] if arguments is None else arguments,

@@ -92,7 +92,8 @@ class TrainingConfig:
         surface_points: on-surface points of a shape in a batch.
         near_points: off-surface points close to the surface.
         uniform_points: off-surface points uniform in the box; too few of them leave ghost surfaces.
-        network_rate: Adam's learning rate for the networks.
+        template_rate: Adam's learning rate for the network T.
+        displacement_rate: Adam's learning rate for the networks f_i.
         latent_rate: Adam's learning rate for the codes.
         cosine: let both rates fall to zero along a cosine instead of staying constant.
         population_share: first part of the training, in which every code is 0, so that the
@@ -111,7 +112,8 @@ class TrainingConfig:
     surface_points: int = 500
     near_points: int = 200
     uniform_points: int = 50
-    network_rate: float = 5e-5
+    template_rate: float = 5e-5
+    displacement_rate: float = 5e-5
     latent_rate: float = 1e-3
     cosine: bool = False
     population_share: float = 0.0
@@ -179,7 +181,8 @@ PRESETS: dict[str, Preset] = {
             surface_points=128,
             near_points=64,
             uniform_points=64,
-            network_rate=5e-4,
+            template_rate=5e-4,
+            displacement_rate=2e-3,
             latent_rate=2e-3,
             cosine=True,
             population_share=0.25,

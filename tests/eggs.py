@@ -29,6 +29,7 @@ def egg_preset(epochs: int) -> Preset:
         surface_points=64,
         near_points=32,
         uniform_points=32,
-        network_rate=2e-3,
+        template_rate=2e-3,
+        displacement_rate=2e-3,
     )
     return Preset(network, training)

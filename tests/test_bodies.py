@@ -84,7 +84,7 @@ def test_the_cohort_is_plausible_and_repeatable():
     assert len({v.subject for v in everybody}) == 200
     ages, weights, sexes = (np.array([v.values[n] for v in everybody]) for n in ("age", "weight", "sex"))
     assert (sexes == 1).sum() == 100
-    assert ages.min() < 2 and ages.max() > 78  # noqa: PT018
+    assert ages.min() < 2 and ages.max() > 78
     assert np.median(ages) == pytest.approx(18, abs=1)
     assert abs(np.corrcoef(ages, weights)[0, 1]) < 0.2
     assert everybody == bodies.visits(seed=3)

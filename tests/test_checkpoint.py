@@ -52,6 +52,8 @@ def test_a_truncated_file_is_refused(egg_atlas, tmp_path, kept):
 
 
 class Bomb:
+    target = ""
+
     def __reduce__(self):
         return (Path.touch, (Path(self.target),))
 

@@ -17,7 +17,7 @@ template = {width = 32, hidden = 1, omega0 = 5.0}
 displacement = {width = 16, hidden = 1, omega0 = 2.0}
 [training]
 batch_shapes = 10
-network_rate = 2e-3
+template_rate = 2e-3
 """
 
 
@@ -105,7 +105,8 @@ def test_bad_input_gets_one_sentence_and_exit_code_2(
 def test_help_is_there_without_heavy_imports():
     probe = (
         "import sys; from naisr_model import cli\n"
-        "try: cli.main(['--help'])\nfinally: assert 'torch' not in sys.modules and 'pyvista' not in sys.modules"
+        "try: cli.main(['--help'])\n"
+        "finally: assert 'torch' not in sys.modules and 'pyvista' not in sys.modules"
     )
     done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
     assert all(word in done.stdout for word in ("prepare", "train", "mesh", "evaluate", "info"))

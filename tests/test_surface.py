@@ -2,6 +2,9 @@
 
 import numpy as np
 import pytest
+import trimesh
+from scipy.spatial import cKDTree
+from skimage.measure import marching_cubes
 
 from naisr_model.errors import Cancelled
 from naisr_model.frames import Frame
@@ -13,13 +16,23 @@ FRAME = Frame((10.0, 0.0, -5.0), 50.0)
 
 
 def sphere(points):
-    return np.linalg.norm(points - np.float32([0.1, 0, 0]), axis=1) - np.float32(0.5)
+    return np.linalg.norm(points - np.array([0.1, 0, 0], np.float32), axis=1) - np.float32(0.5)
 
 
 def thin_ring(points):
     """A tube of 0.03 box units, thinner than a coarse block, of slope 1.6 instead of 1."""
     around = np.hypot(points[:, 0], points[:, 1]) - 0.7
     return (1.6 * (np.hypot(around, points[:, 2]) - 0.03)).astype(np.float32)
+
+
+def test_another_library_finds_the_same_surface():
+    lattice = Lattice(48)
+    values = evaluate_everywhere(sphere, lattice)
+    mesh = isosurface(values, lattice, FRAME)
+    vertices, faces, *_ = marching_cubes(values, 0.0, spacing=(lattice.spacing,) * 3)
+    there = FRAME.to_mm(vertices[:, ::-1] - 1)
+    assert mesh.volume == pytest.approx(abs(trimesh.Trimesh(there, faces).volume), rel=1e-3)
+    assert np.abs(cKDTree(there).query(mesh.vertices)[0]).max() < 1e-3
 
 
 class Counting:
@@ -65,7 +78,7 @@ def test_no_surface_is_an_empty_mesh():
 def test_cancel_is_polled_and_progress_ends_at_one():
     with pytest.raises(Cancelled):
         evaluate_band(sphere, Lattice(64), should_stop=lambda: True)
-    told = []
+    told: list[float] = []
     evaluate_band(sphere, Lattice(64), progress=told.append)
     assert told[-1] == 1 and told == sorted(told)
 

@@ -81,7 +81,8 @@ def test_a_killed_training_ends_like_one_that_was_not(egg_store, tmp_path):
 
 
 def test_a_stopped_training_keeps_what_it_reached(egg_store, tmp_path):
-    out, preset, seen = tmp_path / "stopped.safetensors", egg_preset(epochs=6), []
+    out, preset = tmp_path / "stopped.safetensors", egg_preset(epochs=6)
+    seen: list[training.Report] = []
     with pytest.raises(Cancelled):
         train(egg_store, preset, out, report=seen.append, should_stop=lambda: len(seen) == 5)
     assert load(out).training["iterations"] == 5
@@ -99,9 +100,9 @@ def test_other_settings_do_not_continue_a_training(egg_store, tmp_path):
 def test_divergence_stops_with_advice_and_keeps_the_last_good_state(egg_store, tmp_path, monkeypatch):
     monkeypatch.setattr(training, "SAVE_SECONDS", 0.0)
     preset = egg_preset(epochs=50)
-    wild = dataclasses.replace(preset, training=dataclasses.replace(preset.training, network_rate=30.0))
+    wild = dataclasses.replace(preset, training=dataclasses.replace(preset.training, template_rate=30.0))
     out = tmp_path / "wild.safetensors"
-    with pytest.raises(InputError, match=r"broke down.*last good state is in .*lower network_rate than 30"):
+    with pytest.raises(InputError, match=r"broke down.*last good state is in .*template_rate below 30"):
         train(egg_store, wild, out)
     assert all(torch.isfinite(tensor).all() for tensor in load(out).weights.values())
 

@@ -194,8 +194,9 @@ def _initial_state(preset: Preset, shapes: int, covariates: int, device: str) ->
     parameter = nn.Parameter(codes.to(device))
     optimiser = torch.optim.Adam(
         [
-            {"params": list(network.parameters()), "lr": config.network_rate},
-            {"params": [parameter], "lr": config.latent_rate},
+            {"params": list(network.template_network.parameters())},
+            {"params": list(network.displacement_networks.parameters())},
+            {"params": [parameter]},
         ]
     )
     return _State(network, parameter, optimiser, 0, 0, 0.0)
@@ -253,9 +254,8 @@ def residual_latents(codes: Tensor, basis: Tensor) -> Tensor:
 def _set_rates(state: _State, config: TrainingConfig) -> None:
     share = state.iteration / state.iterations
     factor = 0.5 * (1 + math.cos(math.pi * share)) if config.cosine else 1.0
-    for group, rate in zip(
-        state.optimiser.param_groups, (config.network_rate, config.latent_rate), strict=True
-    ):
+    rates = (config.template_rate, config.displacement_rate, config.latent_rate)
+    for group, rate in zip(state.optimiser.param_groups, rates, strict=True):
         group["lr"] = rate * factor
 
 
@@ -294,7 +294,8 @@ def _divergence_message(total: float, state: _State, config: TrainingConfig, out
     kept = f"the last good state is in {out}" if out.exists() else "no good state had been reached"
     return (
         f"the training broke down at iteration {state.iteration} (loss {total:.3g}); {kept}; "
-        f"try again with a lower network_rate than {config.network_rate:g} or a lower omega0"
+        f"try again with a template_rate below {config.template_rate:g}, a displacement_rate below "
+        f"{config.displacement_rate:g} or a lower omega0"
     )
 
 
