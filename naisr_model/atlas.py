@@ -20,10 +20,10 @@ from naisr_model.checkpoint import Checkpoint, load
 from naisr_model.covariates import Covariate, Population, Values, complete, normalised_vector
 from naisr_model.errors import InputError
 from naisr_model.frames import Frame
-from naisr_model.surface.fields import effect_field, shape_field, template_field
+from naisr_model.surface.fields import distances, effect_field, shape_field, template_field
 from naisr_model.surface.isosurface import isosurface
 from naisr_model.surface.lattice import Lattice
-from naisr_model.surface.sparse import COARSEST, Field, evaluate_band
+from naisr_model.surface.sparse import CHUNK, COARSEST, Field, evaluate_band
 
 Progress = Callable[[float], None]
 StopCheck = Callable[[], bool]
@@ -84,7 +84,9 @@ class Atlas:
         *,
         extrapolate: bool = False,
     ) -> NDArray[np.float64]:
-        """Signed distance of points to the full shape Phi.
+        """Signed distance of points to the full shape, Phi / |grad Phi|.
+
+        That is the distance to first order: exact on the surface, an estimate away from it.
 
         Args:
             points_mm: ``[n, dim]``.
@@ -98,9 +100,13 @@ class Atlas:
         Raises:
             InputError: for an unknown covariate or one out of range.
         """
-        field = shape_field(self._network, self._vector(covariates, extrapolate), self._latent(latent))
         points = self.frame.to_model(points_mm).astype(np.float32).reshape(-1, self.frame.dim)
-        return field(points).astype(np.float64) * self.frame.scale_mm
+        vector, code = self._vector(covariates, extrapolate), self._latent(latent)
+        chunks = [
+            distances(self._network, points[start : start + CHUNK], vector, code)
+            for start in range(0, len(points), CHUNK)
+        ]
+        return np.concatenate(chunks or [np.zeros(0)]).astype(np.float64) * self.frame.scale_mm
 
     def shape(
         self,

@@ -61,6 +61,10 @@ class LossWeights:
         surface_normal: lambda_3, 1 - <grad Phi, n> on the surface.
         space_distance: lambda_4, |Phi - s| off the surface.
         space_eikonal: lambda_5, | |grad Phi| - 1 | off the surface.
+        template_eikonal: | |grad T| - 1 | at the deformed points: the template is a distance while a
+            shape, which may be the template shrunk, need not be.
+        first_order: |Phi / |grad Phi| - s| off the surface, see ``losses.first_order_distance``.
+        first_order_reach: model units beyond which that error counts relative to the distance.
         latent: multiplies |z|^2 / (L sigma^2), so 2 is the paper's lambda_6 = 2 / L.
         latent_sigma: sigma of the latent prior.
         centring: squared mean over the two levels of each binary covariate's displacement at z = 0.
@@ -75,6 +79,9 @@ class LossWeights:
     surface_normal: float = 10.0
     space_distance: float = 100.0
     space_eikonal: float = 10.0
+    template_eikonal: float = 0.0
+    first_order: float = 0.0
+    first_order_reach: float = 0.1
     latent: float = 2.0
     latent_sigma: float = 0.01
     centring: float = 0.0
@@ -176,20 +183,28 @@ PRESETS: dict[str, Preset] = {
             displacement=SirenConfig(width=128, hidden=2, omega0=3.0),
         ),
         TrainingConfig(
-            epochs=300,
-            batch_shapes=8,
-            surface_points=128,
-            near_points=64,
-            uniform_points=64,
+            epochs=600,
+            batch_shapes=16,
+            surface_points=64,
+            near_points=32,
+            uniform_points=32,
             template_rate=5e-4,
-            displacement_rate=2e-3,
-            latent_rate=2e-3,
+            displacement_rate=1e-3,
+            latent_rate=3e-3,
             cosine=True,
-            population_share=0.25,
-            anchor_share=0.25,
+            population_share=0.05,
             residual_latents=True,
             template_epochs=(1, 5, 20, 100),
-            loss=LossWeights(centring=3.0, ridge=0.02),
+            loss=LossWeights(
+                surface_eikonal=0.0,
+                space_distance=0.0,
+                space_eikonal=0.0,
+                template_eikonal=10.0,
+                first_order=100.0,
+                latent=0.01,
+                centring=3.0,
+                ridge=0.02,
+            ),
         ),
     ),
 }

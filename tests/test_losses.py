@@ -29,6 +29,19 @@ def test_known_errors_have_known_losses():
     assert losses.latent_prior(torch.full((3, 4), 0.02), sigma=0.01) == pytest.approx(4)
 
 
+def test_a_shrunk_template_has_no_first_order_loss_but_an_eikonal_one():
+    points = torch.randn(1, 50, 3, dtype=torch.float64)
+    distance, slope = points.norm(dim=-1) - 0.5, points / points.norm(dim=-1, keepdim=True)
+    assert losses.first_order_distance(3 * distance, 3 * slope, distance, reach=0.1) == pytest.approx(
+        0, abs=1e-12
+    )
+    assert losses.eikonal(3 * slope) == pytest.approx(2)
+    far = losses.first_order_distance(
+        torch.tensor([2.5]), torch.tensor([[1.0, 0, 0]]), torch.tensor([2.0]), 0.5
+    )
+    assert far == pytest.approx(0.5 / (1 + 2 / 0.5))
+
+
 def test_centring_ignores_an_antisymmetric_effect_and_ridge_does_not():
     plus = torch.randn(2, 9, 3)
     assert losses.centring(-plus, plus) == 0

@@ -7,7 +7,12 @@ import pytest
 import torch
 
 from naisr_model.config import PRESETS, NetworkConfig, SirenConfig
-from naisr_model.networks.calculus import deformation_determinant, gradient, jacobian
+from naisr_model.networks.calculus import (
+    deformation_determinant,
+    gradient,
+    jacobian,
+    pulled_back_gradient,
+)
 from naisr_model.networks.naisr import Naisr
 from naisr_model.networks.siren import sine
 
@@ -116,6 +121,16 @@ def test_gradients_agree_with_finite_differences():
         (up, up_d), (down, down_d) = (network(points + s, covariates, latents) for s in (shift, -shift))
         torch.testing.assert_close(slope[..., axis], (up - down) / (2 * step), atol=1e-6, rtol=1e-6)
         torch.testing.assert_close(bend[..., axis], (up_d - down_d) / (2 * step), atol=1e-6, rtol=1e-6)
+
+
+def test_the_chain_rule_gives_the_same_gradient():
+    network, (points, covariates, latents) = make(), arguments()
+    points.requires_grad_()
+    displacement = network.displacements(points, covariates, latents).sum(dim=0)
+    deformed = points + displacement
+    values = network.template(deformed)
+    chained = pulled_back_gradient(gradient(values, deformed), displacement, points)
+    torch.testing.assert_close(chained, gradient(values, points))
 
 
 def test_determinant_of_a_known_map():

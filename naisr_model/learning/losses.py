@@ -8,6 +8,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from naisr_model.surface.fields import LEAST_SLOPE
+
 
 def eikonal(gradient: Tensor) -> Tensor:
     """L_Eikonal: mean of | |grad Phi| - 1 |; ``gradient [..., n, dim]``."""
@@ -17,6 +19,24 @@ def eikonal(gradient: Tensor) -> Tensor:
 def distance(predicted: Tensor, target: Tensor | float) -> Tensor:
     """L_Dirichlet: mean of |Phi - s|; ``target`` is 0 on the surface."""
     return (predicted - target).abs().mean()
+
+
+def first_order_distance(predicted: Tensor, gradient: Tensor, target: Tensor, reach: float) -> Tensor:
+    """Mean of |Phi / |grad Phi| - s| / (1 + |s| / reach).
+
+    Phi / |grad Phi| is the distance to the zero level set to first order (Taubin 1991). Where a
+    deformation shrinks the template to a third, Phi grows three times as fast as a distance does:
+    L_Dirichlet and L_Eikonal then pull against the right size, this term does not. Errors count
+    in full near the surface and relative to the distance far beyond ``reach``.
+
+    Args:
+        predicted: Phi, ``[..., n]``.
+        gradient: its gradient, ``[..., n, dim]``.
+        target: signed distance s, ``[..., n]``.
+        reach: in model units.
+    """
+    distances = predicted / gradient.norm(dim=-1).clamp(min=LEAST_SLOPE)
+    return ((distances - target).abs() / (1 + target.abs() / reach)).mean()
 
 
 def normal(gradient: Tensor, normals: Tensor) -> Tensor:

@@ -9,7 +9,7 @@ from torch import Tensor
 
 from naisr_model.config import LossWeights
 from naisr_model.learning import losses
-from naisr_model.networks.calculus import deformation_determinant, gradient
+from naisr_model.networks.calculus import deformation_determinant, gradient, pulled_back_gradient
 from naisr_model.networks.naisr import Naisr
 
 
@@ -47,15 +47,27 @@ def reconstruction_terms(
     """
     on = batch.surface_points.shape[1]
     points = torch.cat([batch.surface_points, batch.space_points], dim=1).requires_grad_()
-    values, displacement = network(points, covariates, latents)
-    slope = gradient(values, points)
+    displacement = network.displacements(points, covariates, latents).sum(dim=0)
+    deformed = points + displacement
+    values = network.template(deformed)
+    template_slope = gradient(values, deformed)
+    slope = pulled_back_gradient(template_slope, displacement, points)
     terms = {
-        "surface_eikonal": weights.surface_eikonal * losses.eikonal(slope[:, :on]),
         "surface_distance": weights.surface_distance * losses.distance(values[:, :on], 0.0),
         "surface_normal": weights.surface_normal * losses.normal(slope[:, :on], batch.surface_normals),
-        "space_distance": weights.space_distance * losses.distance(values[:, on:], batch.space_sdf),
-        "space_eikonal": weights.space_eikonal * losses.eikonal(slope[:, on:]),
     }
+    if weights.surface_eikonal:
+        terms["surface_eikonal"] = weights.surface_eikonal * losses.eikonal(slope[:, :on])
+    if weights.space_distance:
+        terms["space_distance"] = weights.space_distance * losses.distance(values[:, on:], batch.space_sdf)
+    if weights.space_eikonal:
+        terms["space_eikonal"] = weights.space_eikonal * losses.eikonal(slope[:, on:])
+    if weights.template_eikonal:
+        terms["template_eikonal"] = weights.template_eikonal * losses.eikonal(template_slope)
+    if weights.first_order:
+        terms["first_order"] = weights.first_order * losses.first_order_distance(
+            values[:, on:], slope[:, on:], batch.space_sdf, weights.first_order_reach
+        )
     if weights.folding:
         determinant = deformation_determinant(displacement, points)[:, :on]
         terms["folding"] = weights.folding * losses.folding(determinant)

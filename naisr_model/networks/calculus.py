@@ -20,6 +20,18 @@ def gradient(values: Tensor, points: Tensor) -> Tensor:
     return result
 
 
+def pulled_back_gradient(outer: Tensor, displacement: Tensor, points: Tensor) -> Tensor:
+    """Gradient of T(p + d(p)) by the chain rule, (I + grad d)^T grad T, differentiable again.
+
+    Args:
+        outer: grad T at p + d(p), ``[..., n, dim]``.
+        displacement: d(p), ``[..., n, dim]``.
+        points: p, ``[..., n, dim]`` with ``requires_grad``.
+    """
+    (bent,) = torch.autograd.grad(displacement, points, grad_outputs=outer, create_graph=True)
+    return outer + bent
+
+
 def jacobian(vectors: Tensor, points: Tensor) -> Tensor:
     """Jacobian of a vector field, differentiable again.
 

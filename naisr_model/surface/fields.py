@@ -7,9 +7,12 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from naisr_model.networks.calculus import deformation_determinant
+from naisr_model.networks.calculus import deformation_determinant, gradient
 from naisr_model.networks.naisr import Naisr
 from naisr_model.surface.sparse import Field
+
+LEAST_SLOPE = 0.3
+"""Below this slope (on medial axes) Phi / |grad Phi| says nothing about a distance."""
 
 
 def template_field(network: Naisr) -> Field:
@@ -42,6 +45,20 @@ def effect_field(network: Naisr, index: int, covariates: Tensor, latent: Tensor)
         return values[0].numpy()
 
     return field
+
+
+def distances(
+    network: Naisr, points: NDArray[np.float32], covariates: Tensor, latent: Tensor
+) -> NDArray[np.float32]:
+    """Phi / |grad Phi|, the distance to the zero level set to first order, ``[n]`` in model units.
+
+    Phi itself is a distance only as far as the training made it one: where the template is shrunk,
+    Phi is steeper than a distance.
+    """
+    located = torch.from_numpy(points)[None].requires_grad_()
+    values, _ = network(located, covariates[None], latent[None])
+    slope = gradient(values, located).norm(dim=-1).clamp(min=LEAST_SLOPE)
+    return (values / slope)[0].numpy(force=True)
 
 
 def folded(

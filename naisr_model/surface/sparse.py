@@ -2,7 +2,8 @@
 
 An octree walks from blocks of :data:`COARSEST` cells down to single cells. A block can hold a piece
 of the surface only where the field at its centre is at most the field's steepest slope times half
-the block's diagonal; all other blocks are done, with the sign of their centre.
+the block's diagonal; all other blocks are done, with the sign of their centre. The steepest slope is
+measured on the field itself.
 """
 
 from __future__ import annotations
@@ -22,8 +23,9 @@ Field = Callable[[NDArray[np.float32]], NDArray[np.float32]]
 COARSEST = 8
 """Cells along a side of the largest blocks."""
 
-STEEPEST = 2.0
-"""Slope that a block is tested with. A true distance has 1; trained fields overshoot a little."""
+LEAST_BOUND, SAFETY = 2.0, 1.5
+"""Blocks are tested with the steepest slope between neighbouring coarse centres times ``SAFETY``, at least
+``LEAST_BOUND``. A distance has slope 1, but a template shrunk to a third has slope 3."""
 
 CHUNK = 16_384
 """Points evaluated between two looks at ``should_stop``."""
@@ -60,11 +62,13 @@ def evaluate_band(
     size = COARSEST
     blocks = Lattice(lattice.resolution // size - 1, lattice.dim).nodes() * size
     values = np.empty(lattice.shape, np.float32)
-    done = 0.0
+    done, slope = 0.0, LEAST_BOUND
     while size > 1:
         centres = lattice.points(blocks + size / 2)
         centre_values = _chunked(field, centres, None, should_stop)
-        near = np.abs(centre_values) <= STEEPEST * lattice.spacing * size / 2 * np.sqrt(lattice.dim)
+        if size == COARSEST:
+            slope = max(LEAST_BOUND, SAFETY * _steepest(centre_values, lattice))
+        near = np.abs(centre_values) <= slope * lattice.spacing * size / 2 * np.sqrt(lattice.dim)
         for offset in _corners(lattice.dim, size + 1):
             values[_array_index(blocks[~near] + offset)] = centre_values[~near]
         size //= 2
@@ -78,6 +82,13 @@ def evaluate_band(
     rest = None if progress is None else lambda share: progress(done + (1 - done) * share)
     values[_array_index(nodes)] = _chunked(field, lattice.points(nodes), rest, should_stop)
     return values
+
+
+def _steepest(centre_values: NDArray[np.float32], lattice: Lattice) -> float:
+    """Largest slope along an axis between the centres of neighbouring coarsest blocks."""
+    blocks = centre_values.reshape((lattice.resolution // COARSEST,) * lattice.dim)
+    steps = [np.abs(np.diff(blocks, axis=axis)).max() for axis in range(lattice.dim)]
+    return float(max(steps)) / (COARSEST * lattice.spacing)
 
 
 def _corners(dim: int, count: int) -> list[tuple[int, ...]]:
