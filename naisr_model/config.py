@@ -67,7 +67,7 @@ class LossWeights:
         first_order_reach: model units beyond which that error counts relative to the distance.
         latent: multiplies |z|^2 / (L sigma^2), so 2 is the paper's lambda_6 = 2 / L.
         latent_sigma: sigma of the latent prior.
-        centring: squared mean over the two levels of each binary covariate's displacement at z = 0.
+        centring: length of the mean over a binary covariate's two levels of its displacement at z = 0.
             The level 0 between them is never observed, so without this term that displacement could
             carry any offset common to everybody and the template would stand elsewhere.
         ridge: mean squared displacement at z = 0, which settles what the data leave open.
@@ -202,7 +202,7 @@ PRESETS: dict[str, Preset] = {
                 template_eikonal=10.0,
                 first_order=100.0,
                 latent=0.01,
-                centring=3.0,
+                centring=30.0,
                 ridge=0.02,
             ),
         ),

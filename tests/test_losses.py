@@ -42,10 +42,12 @@ def test_a_shrunk_template_has_no_first_order_loss_but_an_eikonal_one():
     assert far == pytest.approx(0.5 / (1 + 2 / 0.5))
 
 
-def test_centring_ignores_an_antisymmetric_effect_and_ridge_does_not():
-    plus = torch.randn(2, 9, 3)
-    assert losses.centring(-plus, plus) == 0
-    assert losses.centring(plus, plus) == pytest.approx(float(losses.ridge(plus)))
+def test_centring_measures_what_two_levels_share():
+    plus = torch.randn(2, 9, 3, dtype=torch.float64)
+    assert losses.centring(-plus, plus) == pytest.approx(0, abs=1e-12)
+    shared = torch.tensor([0.03, 0.0, 0.04], dtype=torch.float64)
+    assert losses.centring(shared - plus, shared + plus) == pytest.approx(0.05, rel=0.01)
+    assert losses.ridge(shared.expand(5, 3)) == pytest.approx(0.0025)
 
 
 def test_folding_counts_only_negative_determinants():

@@ -10,6 +10,9 @@ from torch import Tensor
 
 from naisr_model.surface.fields import LEAST_SLOPE
 
+SMOOTHED_LENGTH = 1e-4
+"""Model units below which a length is smoothed to a square, so that its gradient exists at 0."""
+
 
 def eikonal(gradient: Tensor) -> Tensor:
     """L_Eikonal: mean of | |grad Phi| - 1 |; ``gradient [..., n, dim]``."""
@@ -50,8 +53,16 @@ def latent_prior(latents: Tensor, sigma: float) -> Tensor:
 
 
 def centring(at_minus: Tensor, at_plus: Tensor) -> Tensor:
-    """Mean squared offset that a binary covariate's two displacements share; ``[..., n, dim]`` each."""
-    return ((at_minus + at_plus) / 2).square().sum(dim=-1).mean()
+    """Mean length of the offset that a binary covariate's two displacements share.
+
+    The length, not its square: a tube's calibre doubles within offsets whose square is nothing.
+
+    Args:
+        at_minus: displacements at -1, ``[..., n, dim]``.
+        at_plus: displacements at +1, ``[..., n, dim]``.
+    """
+    squared = ((at_minus + at_plus) / 2).square().sum(dim=-1)
+    return (squared + SMOOTHED_LENGTH**2).sqrt().mean() - SMOOTHED_LENGTH
 
 
 def ridge(displacements: Tensor) -> Tensor:

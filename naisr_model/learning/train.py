@@ -36,7 +36,8 @@ POINTS_AT_ONCE = 1024
 """Points whose activations are alive together: they stay in the cache, twice as fast on a CPU."""
 
 SAVE_SECONDS = 60.0
-POPULATION_SHAPES, POPULATION_POINTS = 4, 64
+POPULATION_SHAPES = 4
+"""Shapes of a batch at whose points the effects are held in place."""
 MEASURED_ITERATIONS = 20
 FOLDING_SHAPES, FOLDING_POINTS = 40, 1000
 DIVERGED = 20.0
@@ -238,7 +239,7 @@ def _step(
         _accumulate(terms, (stop - start) / len(chosen), sums)
     _accumulate(latent_term(leaf, config.loss), 1.0, sums)
     few = chosen[:POPULATION_SHAPES]
-    points = batch.space_points[: len(few), -POPULATION_POINTS:]
+    points = batch.space_points[: len(few)]
     _accumulate(population_terms(state.network, points, covariates[few], binary, config.loss), 1.0, sums)
     assert leaf.grad is not None
     (residual * with_code).backward(leaf.grad)
