@@ -106,7 +106,7 @@ class Atlas:
             distances(self._network, points[start : start + CHUNK], vector, code)
             for start in range(0, len(points), CHUNK)
         ]
-        return np.concatenate(chunks or [np.zeros(0)]).astype(np.float64) * self.frame.scale_mm
+        return np.concatenate([np.zeros(0), *chunks]) * self.frame.scale_mm
 
     def shape(
         self,

@@ -215,7 +215,7 @@ def reconstruction(
     *,
     store: Path | None = None,
     json_file: Annotated[Path | None, Parameter(name="--json")] = None,
-    steps: int = 800,
+    steps: int = 200,
     limit: int = 0,
 ) -> None:
     """Refit the held-out shapes with their covariates known, and check the effects where the truth is known.

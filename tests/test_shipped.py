@@ -7,9 +7,11 @@ import pytest
 import torch
 
 from naisr_model.atlas import Atlas
+from naisr_model.config import FitConfig
 from naisr_model.covariates import normalised_vector
 from naisr_model.data.populations import airway
-from naisr_model.evaluation.metrics import component_count
+from naisr_model.evaluation.metrics import compare, component_count
+from naisr_model.evaluation.reconstruction import fit_all, held_out_shapes, plausible_values
 from naisr_model.surface.fields import shape_field
 from naisr_model.surface.isosurface import isosurface
 from naisr_model.surface.lattice import Lattice
@@ -71,3 +73,25 @@ def test_the_band_misses_nothing_of_a_real_atlas(atlas):
         banded = isosurface(evaluate_band(field, lattice), lattice, atlas.frame)
         assert (dense.faces == banded.faces).all()
         assert np.abs(dense.vertices - banded.vertices).max() < 1e-5 * 2 * atlas.frame.scale_mm
+
+
+def test_unseen_patients_are_reconstructed(atlas):
+    shapes = held_out_shapes(atlas, store=None, limit=3)
+    latents = fit_all(atlas, shapes, FitConfig(steps=100, surface_points=128, space_points=128))
+    for shape, latent in zip(shapes, latents, strict=True):
+        distances = compare(
+            shape.mesh_mm, atlas.shape(shape.values, latent, extrapolate=True), emd_samples=50
+        )
+        assert distances.cd_x100 < 0.06
+        assert distances.hd_x100 < 10
+
+
+def test_effects_are_judged_only_where_somebody_is(atlas):
+    age, weight, sex = atlas.covariates
+    ages = plausible_values(atlas.population, age)
+    # Nobody of a few months or of nineteen years has the cohort's mean weight.
+    assert age.range[0] + 40 < min(ages) < age.centre < max(ages) < age.range[1] - 40
+    assert all(
+        weight.range[0] < value < weight.range[1] for value in plausible_values(atlas.population, weight)
+    )
+    assert plausible_values(atlas.population, sex) == [-1, 1]

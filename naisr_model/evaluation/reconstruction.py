@@ -33,7 +33,8 @@ SAMPLES_OF_A_FIT = 20_000
 NEIGHBOURS, NEIGHBOUR_DISTANCE = 3, 0.25
 EFFECT_VALUES = 9
 FOLDING_SHAPES, FOLDING_POINTS = 40, 2000
-FITTED_AT_ONCE = 8
+FITTED_AT_ONCE = 4
+"""Shapes fitted together: their activations stay in the processor's cache."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ class EvaluationConfig:
         limit: at most so many held-out shapes; 0 takes all.
     """
 
-    fit: FitConfig = field(default_factory=lambda: FitConfig(steps=800, surface_points=128, space_points=128))
+    fit: FitConfig = field(default_factory=lambda: FitConfig(steps=200, surface_points=128, space_points=128))
     resolution: int = 128
     check_resolution: int = 96
     limit: int = 0
@@ -79,8 +80,7 @@ def evaluate(
         InputError: when there are no held-out shapes to be had.
         Cancelled: when ``should_stop()`` turned true.
     """
-    shapes = held_out_shapes(atlas, store)
-    shapes = shapes[: config.limit] if config.limit else shapes
+    shapes = held_out_shapes(atlas, store, config.limit or None)
     latents = fit_all(atlas, shapes, config.fit, _part(progress, 0.0, 0.7), should_stop)
     distances, components = [], []
     for done, (shape, latent) in enumerate(zip(shapes, latents, strict=True), start=1):
@@ -107,10 +107,14 @@ def evaluate(
     return report
 
 
-def held_out_shapes(atlas: Atlas, store: SampleStore | None) -> list[HeldOut]:
-    """The held-out shapes of a store, or of the synthetic population that the atlas was made from."""
+def held_out_shapes(atlas: Atlas, store: SampleStore | None, limit: int | None = None) -> list[HeldOut]:
+    """The first held-out shapes of a store, or of the synthetic population that the atlas was made from.
+
+    Raises:
+        InputError: when the atlas was made from somebody's own data and no store is given.
+    """
     if store is not None:
-        rows = np.flatnonzero(store.population.held_out)
+        rows = np.flatnonzero(store.population.held_out)[:limit]
         return [HeldOut(store.population.row(int(row)), store.mesh(int(row))) for row in rows]
     module = _synthetic(atlas)
     if module is None:
@@ -119,7 +123,8 @@ def held_out_shapes(atlas: Atlas, store: SampleStore | None) -> list[HeldOut]:
         )
     source, population = atlas.checkpoint.source, atlas.population
     held_out = {
-        (population.subjects[row], population.visits[row]) for row in np.flatnonzero(population.held_out)
+        (population.subjects[row], population.visits[row])
+        for row in np.flatnonzero(population.held_out)[:limit]
     }
     visits = module.visits(int(source["seed"]), int(source["patients"]))
     return [

@@ -1,0 +1,1 @@
+"""The desktop program: drag age, weight and sex and watch the anatomy change."""

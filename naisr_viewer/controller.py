@@ -1,0 +1,433 @@
+"""The only wiring: user acts to states, states to requests, results to the window."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from enum import Enum, auto
+from pathlib import Path
+from types import MappingProxyType, TracebackType
+
+from PySide6.QtCore import QObject, QSettings, QTimer, Signal
+
+from naisr_viewer import export
+from naisr_viewer.engine import VERSION, Cancelled, Engine, InputError
+from naisr_viewer.requests import (
+    EXACT_RESOLUTION,
+    PREVIEW_RESOLUTION,
+    ExportChoice,
+    SurfaceRequest,
+    SurfaceResult,
+    answers,
+)
+from naisr_viewer.state import (
+    AtlasCard,
+    ExplorerState,
+    History,
+    Layout,
+    Panel,
+    is_seen,
+    opened,
+    panel_values,
+    record,
+    redo,
+    undo,
+    visible_panels,
+    with_all_centred,
+    with_centre,
+    with_value,
+)
+from naisr_viewer.views.main_window import MainWindow
+from naisr_viewer.views.theme import ThemeChoice
+from naisr_viewer.worker import Job, Worker
+
+PATIENCE_MS = 1000
+"""Work shorter than this shows no progress bar."""
+
+RECENT_FILES = 8
+UNSEEN = "outside the data"
+UNSEEN_HINT = (
+    "Hardly anyone behind the atlas is near this combination of covariates (those not moved here are at "
+    "their mean), so the shape is a guess."
+)
+
+
+class Task(Enum):
+    """What the worker is busy with."""
+
+    NOTHING = auto()
+    OPENING = auto()
+    PREVIEW = auto()
+    EXACT = auto()
+    EXPORT = auto()
+
+
+@dataclass(frozen=True)
+class ExportReport:
+    """An export that came to its end."""
+
+    count: int
+    choice: ExportChoice
+
+    @property
+    def sentence(self) -> str:
+        """What the status line says."""
+        surfaces = "1 surface" if self.count == 1 else f"{self.count} surfaces"
+        return f"Exported {surfaces} as {self.choice.format.upper()} to {self.choice.folder}"
+
+
+class Controller(QObject):
+    """One window's life.
+
+    Args:
+        window: shows the state.
+        engine: computes surfaces.
+        worker: runs the engine beside the window.
+        settings: remembers recent files and the theme.
+    """
+
+    settled = Signal()  # everything on screen is exact, or the computation ended otherwise
+
+    def __init__(self, window: MainWindow, engine: Engine, worker: Worker, settings: QSettings) -> None:
+        super().__init__()
+        self.state = ExplorerState()
+        self.shown: dict[Panel, SurfaceResult] = {}
+        self._window, self._engine, self._worker, self._settings = window, engine, worker, settings
+        self._history = History()
+        self._before_move: ExplorerState | None = None
+        self._task = Task.NOTHING
+        self._halted = ""
+        self._notice = ""
+        self._patience = QTimer(self, singleShot=True, interval=PATIENCE_MS)
+        self._connect()
+        window.show_recent(self._recent())
+        window.show_theme(ThemeChoice(str(settings.value("theme", ThemeChoice.SYSTEM.value))))
+        window.show_history(False, False)
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether the user is in the middle of changing a covariate."""
+        return self._before_move is not None
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether the worker has something to do."""
+        return self._task is not Task.NOTHING
+
+    def open(self, path: Path) -> None:
+        """Read an atlas beside the window and show it at its population mean."""
+
+        def job(
+            deliver: Callable[[object], None],
+            progress: Callable[[float], None],
+            should_stop: Callable[[], bool],
+        ) -> None:
+            deliver(self._engine.open(path.absolute()))
+
+        self._window.show_error("")
+        self._window.show_opening(path.name)
+        self._window.show_status(f"Opening {path.name} …")
+        self._start(Task.OPENING, job)
+
+    def show_atlas(self, card: AtlasCard, values: Mapping[str, float] = MappingProxyType({})) -> None:
+        """Show an atlas that is open in the engine; covariates left out are at their mean."""
+        self.shown = {}
+        self._history = History()
+        self._before_move = None
+        self._remember(card.path)
+        state = opened(self.state, card)
+        for name, value in values.items():
+            state = with_value(state, name, value)
+        self._go(state)
+
+    def export(self, choice: ExportChoice) -> None:
+        """Write surfaces at the present values; what is missing is computed first."""
+        atlas = self.state.atlas
+        if atlas is None:
+            return
+        requests = [self._request(panel, choice.resolution) for panel in choice.panels]
+
+        def job(
+            deliver: Callable[[object], None],
+            progress: Callable[[float], None],
+            should_stop: Callable[[], bool],
+        ) -> None:
+            for place, request in enumerate(requests):
+                result = self._engine.surface(request, _part(progress, place, len(requests)), should_stop)
+                path = choice.folder / f"{export.file_stem(atlas, result)}.{choice.format}"
+                export.write_surface(path, result, atlas)
+            deliver(ExportReport(len(requests), choice))
+
+        self._window.show_error("")
+        self._window.set_editable(False)
+        self._window.show_status(f"Exporting into {choice.folder} …")
+        self._start(Task.EXPORT, job)
+
+    def save_screenshot(self, path: Path) -> None:
+        """Write a picture of the whole window; the ending of ``path`` says which kind."""
+        image = self._window.grab_image()
+
+        def write(place: Path) -> None:
+            if not image.save(str(place)):
+                raise InputError(f"cannot write a picture to {path}; end its name with .png")
+
+        try:
+            export.write_atomically(path, write)
+        except InputError as error:
+            self._window.show_error(in_words(error))
+        else:
+            self._notice = f"Saved {path}"
+            self._show_status()
+
+    def move(self, name: str, value: float) -> None:
+        """A covariate is on its way; coarse surfaces follow it."""
+        if self._before_move is None:
+            self._before_move = self.state
+            self._window.shapes.set_moving(True)
+        self._go(with_value(self.state, name, value))
+
+    def settle(self, name: str, value: float) -> None:
+        """A covariate came to rest; what lies behind is one step to undo."""
+        before = self._before_move or self.state
+        self._before_move = None
+        self._window.shapes.set_moving(False)
+        self._commit(before, with_value(self.state, name, value))
+
+    def reset(self, name: str) -> None:
+        """One covariate to the population mean."""
+        self._commit(self.state, with_centre(self.state, name))
+
+    def reset_all(self) -> None:
+        """All covariates to the population mean."""
+        self._commit(self.state, with_all_centred(self.state))
+
+    def undo(self) -> None:
+        """One change of the covariates back."""
+        self._travel(*undo(self._history, self.state.values))
+
+    def redo(self) -> None:
+        """One change of the covariates forward again."""
+        self._travel(*redo(self._history, self.state.values))
+
+    def set_layout(self, layout: Layout) -> None:
+        """Show other sub-plots."""
+        self._go(replace(self.state, layout=layout))
+
+    def set_theme(self, choice: ThemeChoice) -> None:
+        """Colour the window and remember it."""
+        self._settings.setValue("theme", choice.value)
+        self._window.show_theme(choice)
+
+    def cancel(self) -> None:
+        """Stop computing and keep what is on screen."""
+        if self._task in (Task.PREVIEW, Task.EXACT):
+            self._halted = "Stopped"
+        else:
+            self._notice = "Cancelled"
+        self._worker.cancel()
+
+    def report(self, kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+        """Show an error that nobody expected in the window; its origin goes to the console."""
+        sys.__excepthook__(kind, error, trace)
+        self._window.show_error(in_words(error))
+
+    def shutdown(self) -> None:
+        """Stop the worker and all timers; nothing happens afterwards."""
+        self._patience.stop()
+        self._worker.close()
+
+    def _connect(self) -> None:
+        window, worker = self._window, self._worker
+        window.open_requested.connect(self.open)
+        window.export_requested.connect(self.export)
+        window.screenshot_requested.connect(self.save_screenshot)
+        window.undo_requested.connect(self.undo)
+        window.redo_requested.connect(self.redo)
+        window.layout_requested.connect(self.set_layout)
+        window.theme_requested.connect(self.set_theme)
+        window.cancel_requested.connect(self.cancel)
+        window.about_requested.connect(lambda: window.show_about(VERSION))
+        window.closing.connect(self.shutdown)
+        window.covariates.value_moved.connect(self.move)
+        window.covariates.value_settled.connect(self.settle)
+        window.covariates.reset_requested.connect(self.reset)
+        window.covariates.reset_all_requested.connect(self.reset_all)
+        worker.delivered.connect(self._delivered)
+        worker.progressed.connect(self._progressed)
+        worker.failed.connect(self._failed)
+        worker.idle.connect(self._idle)
+        self._patience.timeout.connect(lambda: self._window.show_progress(0.0))
+
+    def _commit(self, before: ExplorerState, after: ExplorerState) -> None:
+        self._history = record(self._history, before.values, after.values)
+        self._go(after)
+
+    def _travel(self, history: History, values: tuple[float, ...]) -> None:
+        self._history = history
+        self._go(replace(self.state, values=values))
+
+    def _go(self, state: ExplorerState) -> None:
+        """Make ``state`` the present one."""
+        self.state = state
+        self._halted = self._notice = ""
+        self._window.show_state(state)
+        self._window.show_history(bool(self._history.past), bool(self._history.future))
+        self._refresh()
+
+    def _request(self, panel: Panel, resolution: int) -> SurfaceRequest:
+        assert self.state.atlas is not None
+        return SurfaceRequest(self.state.atlas.path, panel, panel_values(self.state, panel), resolution)
+
+    def _missing(self, resolution: int) -> list[SurfaceRequest]:
+        """What is not on screen at ``resolution`` yet, the full shape first."""
+        wanted = [self._request(panel, resolution) for panel in reversed(visible_panels(self.state))]
+        return [request for request in wanted if not answers(self.shown.get(request.panel), request)]
+
+    def _refresh(self) -> None:
+        """Show what is remembered and set the worker on what is missing."""
+        if self._task in (Task.OPENING, Task.EXPORT) or self.state.atlas is None:
+            return
+        for resolution in (EXACT_RESOLUTION, PREVIEW_RESOLUTION):
+            for request in self._missing(resolution):
+                if (result := self._engine.cached(request)) is not None:
+                    self._show(result)
+        coarse = self._missing(PREVIEW_RESOLUTION)
+        fine = [] if self.is_moving else self._missing(EXACT_RESOLUTION)
+        if self._task is Task.EXACT or not (coarse or fine):
+            self._worker.cancel()
+        if coarse:
+            self._start(Task.PREVIEW, self._surfaces_job(coarse))
+        elif fine:
+            self._start(Task.EXACT, self._surfaces_job(fine))
+        self._show_status()
+
+    def _surfaces_job(self, requests: list[SurfaceRequest]) -> Job:
+        engine = self._engine
+
+        def job(
+            deliver: Callable[[object], None],
+            progress: Callable[[float], None],
+            should_stop: Callable[[], bool],
+        ) -> None:
+            for place, request in enumerate(requests):
+                deliver(engine.surface(request, _part(progress, place, len(requests)), should_stop))
+
+        return job
+
+    def _start(self, task: Task, job: Job) -> None:
+        if task in (Task.OPENING, Task.EXPORT):
+            self._worker.cancel()
+        self._task = task
+        if task is Task.PREVIEW:
+            self._patience.stop()
+            self._window.show_progress(None)
+        elif not self._patience.isActive():
+            self._patience.start()
+        self._worker.submit(job)
+
+    def _delivered(self, item: object) -> None:
+        if isinstance(item, AtlasCard):
+            self.show_atlas(item)
+        elif isinstance(item, ExportReport):
+            self._notice = item.sentence
+        elif isinstance(item, SurfaceResult) and self._is_wanted(item):
+            self._show(item)
+            self._show_status()
+
+    def _is_wanted(self, result: SurfaceResult) -> bool:
+        """Whether a result still belongs on screen; while moving, the way there does too."""
+        asked, panel = result.request, result.request.panel
+        if panel not in visible_panels(self.state) or asked.atlas != self._request(panel, 0).atlas:
+            return False
+        if answers(self.shown.get(panel), self._request(panel, asked.resolution)):
+            return False
+        return self.is_moving or asked.values == panel_values(self.state, panel)
+
+    def _show(self, result: SurfaceResult) -> None:
+        panel = result.request.panel
+        self.shown[panel] = result
+        self._window.shapes.show_surface(result)
+        self._window.shapes.set_caption(panel, *self._caption(result))
+
+    def _caption(self, result: SurfaceResult) -> tuple[str, str]:
+        assert self.state.atlas is not None
+        if len(result.faces) == 0:
+            return "no surface at these values", "The signed distance is nowhere zero inside the box."
+        text = f'<span style="font-size:12pt">{result.volume_cm3:.1f} cm³</span>'
+        if is_seen(self.state.atlas.population, dict(result.request.values)):
+            return text, "Enclosed volume"
+        return f"{text}<br>{UNSEEN}", UNSEEN_HINT
+
+    def _progressed(self, fraction: float) -> None:
+        if not self._patience.isActive() and self._task is not Task.PREVIEW:
+            self._window.show_progress(fraction)
+
+    def _failed(self, error: Exception) -> None:
+        if isinstance(error, Cancelled):
+            return
+        if self._task in (Task.PREVIEW, Task.EXACT):
+            self._halted = "Stopped by an error"
+        self._window.show_error(in_words(error))
+
+    def _idle(self) -> None:
+        was, self._task = self._task, Task.NOTHING
+        if was is Task.OPENING:
+            self._window.show_opening("")
+        if was is Task.EXPORT:
+            self._window.set_editable(True)
+        if not self._halted:
+            self._refresh()
+        if self._task is Task.NOTHING:
+            self._patience.stop()
+            self._window.show_progress(None)
+            self._show_status()
+            self.settled.emit()
+
+    def _show_status(self) -> None:
+        self._window.show_status(self._status())
+
+    def _status(self) -> str:
+        shown = [self.shown[panel] for panel in visible_panels(self.state) if panel in self.shown]
+        if self.state.atlas is None or not shown:
+            return self._halted or ("Opening …" if self.is_busy else "No atlas open")
+        exact = [result for result in shown if result.is_exact]
+        coarse = [result for result in shown if not result.is_exact]
+        behind = f"{len(self._missing(0))} of {len(visible_panels(self.state))} views"
+        if self._missing(0) and self._halted:
+            return f"{self._halted} · {behind} show earlier values"
+        if self._missing(0) and not coarse:
+            return f"Updating {behind} …"
+        seconds = sum({id(result.points_mm): result.seconds for result in coarse or exact}.values())
+        size = (coarse or exact)[0].request.resolution
+        text = f"{'Preview' if coarse else 'Exact'} {size}³ in {seconds:.2g} s"
+        if self._task is Task.EXACT:
+            text += f" · refining to {EXACT_RESOLUTION}³, {len(exact)} of {len(shown)} views done"
+        return " · ".join(filter(None, (text, self._halted, self._notice)))
+
+    def _recent(self) -> list[Path]:
+        stored = self._settings.value("recent", [])
+        names = [stored] if isinstance(stored, str) else list(stored or [])  # type: ignore[call-overload]
+        return [Path(name) for name in names if Path(name).is_file()]
+
+    def _remember(self, path: Path) -> None:
+        recent = [path, *(other for other in self._recent() if other != path)][:RECENT_FILES]
+        self._settings.setValue("recent", [str(each) for each in recent])
+        self._window.show_recent(recent)
+
+
+def in_words(error: BaseException) -> str:
+    """An error as the user reads it."""
+    if isinstance(error, InputError):
+        text = str(error)
+        first = text.split(" ", 1)[0]
+        start = text[:1].upper() if first.isalpha() else text[:1]
+        return start + text[1:] + ("" if text.endswith(".") else ".")
+    return (
+        f"Something unexpected went wrong ({type(error).__name__}: {error}). What is on screen is unchanged."
+    )
+
+
+def _part(progress: Callable[[float], None], place: int, count: int) -> Callable[[float], None]:
+    """Progress of one piece as progress of the whole."""
+    return lambda fraction: progress((place + fraction) / count)

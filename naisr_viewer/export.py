@@ -1,0 +1,111 @@
+"""Surfaces to files in millimetres, each with a record of what it is beside it. No Qt."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+import trimesh
+
+from naisr_viewer.engine import VERSION, InputError
+from naisr_viewer.requests import FORMATS, SurfaceResult
+from naisr_viewer.state import AtlasCard, Covariate, panel_title
+
+
+def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
+    """Let ``write`` fill a temporary file in the folder of ``path``, then put it in place.
+
+    Raises:
+        InputError: when the folder cannot be written to.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
+    except OSError as error:
+        raise InputError(f"cannot write {path}: {error.strerror}; choose another folder") from error
+    os.close(handle)
+    try:
+        write(Path(name))
+        os.chmod(name, 0o644)
+        os.replace(name, path)
+    except OSError as error:
+        raise InputError(f"cannot write {path}: {error.strerror or error}; choose another folder") from error
+    finally:
+        Path(name).unlink(missing_ok=True)
+
+
+def write_surface(path: Path, result: SurfaceResult, atlas: AtlasCard) -> tuple[Path, Path]:
+    """Write a surface and, beside it, a JSON record of what it shows.
+
+    Args:
+        path: the mesh file; its ending is one of :data:`FORMATS`.
+        result: the surface, in millimetres.
+        atlas: where it came from.
+
+    Returns:
+        The mesh file and the record.
+
+    Raises:
+        InputError: when there is no surface to write, or the ending or folder will not do.
+    """
+    if len(result.faces) == 0:
+        raise InputError(
+            f"{panel_title(result.request.panel)} has no surface at these values; nothing to write"
+        )
+    ending = path.suffix.lower().removeprefix(".")
+    if ending not in FORMATS:
+        raise InputError(f"cannot write '{path.name}'; the ending must be one of {', '.join(FORMATS)}")
+    beside = path.with_suffix(".json")
+    write_atomically(path, lambda place: _write_mesh(place, ending, result))
+    text = json.dumps(description(result, atlas, path.name), indent=2, ensure_ascii=False) + "\n"
+    write_atomically(beside, lambda place: place.write_text(text, encoding="utf-8"))
+    return path, beside
+
+
+def description(result: SurfaceResult, atlas: AtlasCard, file_name: str) -> dict[str, Any]:
+    """What a mesh file shows, as plain JSON."""
+    request = result.request
+    given = dict(request.values)
+    return {
+        "file": file_name,
+        "atlas": atlas.name,
+        "atlas_file": atlas.path.name,
+        "view": panel_title(request.panel),
+        "covariates": {c.name: _covariate_record(c, given.get(c.name, c.centre)) for c in atlas.covariates},
+        "depends_on": sorted(given),
+        "length_unit": "mm",
+        "volume_cm3": round(result.volume_cm3, 4),
+        "vertices": len(result.points_mm),
+        "triangles": len(result.faces),
+        "lattice_resolution": request.resolution,
+        "program": f"naisr-viewer {VERSION}",
+    }
+
+
+def file_stem(atlas: AtlasCard, result: SurfaceResult) -> str:
+    """A telling file name without an ending: ``airway-age-only``."""
+    return f"{atlas.name}-{panel_title(result.request.panel)}".lower().replace(" ", "-").replace("/", "-")
+
+
+def _covariate_record(covariate: Covariate, value: float) -> dict[str, Any]:
+    record: dict[str, Any] = {"value": value, "unit": covariate.unit}
+    if covariate.kind == "binary":
+        record["reading"] = covariate.format(value)
+    return record
+
+
+def _write_mesh(path: Path, ending: str, result: SurfaceResult) -> None:
+    if ending == "vtp":
+        mesh = pv.PolyData.from_regular_faces(result.points_mm, result.faces)
+        mesh.point_data.active_normals = result.normals
+        mesh.save(path)
+        return
+    points = np.asarray(result.points_mm, dtype=np.float64)
+    surface = trimesh.Trimesh(points, result.faces, vertex_normals=result.normals, process=False)
+    surface.export(path, file_type=ending)

@@ -1,0 +1,144 @@
+"""The same window without a person or a display: screenshots and the demonstration."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtCore import QCoreApplication, QEventLoop, QPoint, Qt
+from PySide6.QtTest import QTest
+
+from naisr_viewer.controller import Controller
+from naisr_viewer.engine import InputError
+from naisr_viewer.requests import EXACT_RESOLUTION, ExportChoice
+from naisr_viewer.state import Layout, all_panels
+from naisr_viewer.views.covariate_panel import HANDLE_PX, CovariateRow
+from naisr_viewer.views.main_window import MainWindow
+
+DEADLINE_S = 600.0
+"""Nothing on screen takes longer than this, even on a slow machine."""
+
+DRAG_STEPS = 24
+FRAME_S = 0.03
+
+
+def has_display() -> bool:
+    """Whether windows can be shown here."""
+    if sys.platform in ("win32", "darwin"):
+        return True
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def ensure_display(pixels: tuple[int, int]) -> None:
+    """Where there is no display, make a virtual one of ``pixels`` for the rest of this process.
+
+    The server ends by itself with the last connection to it, because a window system must not go
+    away under a running application.
+
+    Raises:
+        InputError: when there is no display and none can be made.
+    """
+    if has_display():
+        return
+    program = shutil.which("Xvfb")
+    if program is None:
+        raise InputError(
+            "there is no display and Xvfb is not installed; install the package 'xvfb' and try again"
+        )
+    reading, writing = os.pipe()
+    screen = f"{pixels[0]}x{pixels[1]}x24"
+    command = [program, "-displayfd", str(writing), "-terminate", "-screen", "0", screen, "-nolisten", "tcp"]
+    subprocess.Popen(command, pass_fds=[writing], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    os.close(writing)
+    with os.fdopen(reading) as pipe:
+        number = pipe.readline().strip()
+    if not number:
+        raise InputError("the virtual display (Xvfb) did not start; run Xvfb by hand to see why")
+    os.environ["DISPLAY"] = f":{number}"
+
+
+def wait_until(condition: Callable[[], bool], seconds: float = DEADLINE_S) -> None:
+    """Run the window until ``condition`` holds.
+
+    Raises:
+        InputError: when it does not within ``seconds``.
+    """
+    end = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > end:
+            raise InputError(f"gave up after {seconds:g} s; the machine is too slow or the atlas too large")
+        QCoreApplication.processEvents(QEventLoop.ProcessEventsFlag.AllEvents, 20)
+        time.sleep(0.002)
+
+
+def pause(seconds: float) -> None:
+    """Let the window and the worker go on; ``QTest.qWait`` would keep Python from the worker."""
+    end = time.monotonic() + seconds
+    wait_until(lambda: time.monotonic() > end)
+
+
+def finish(window: MainWindow, controller: Controller) -> None:
+    """Wait until the window is exact.
+
+    Raises:
+        InputError: when the window reports an error instead.
+    """
+    wait_until(lambda: not controller.is_busy)
+    if window.error_text.text():
+        raise InputError(window.error_text.text())
+
+
+def take_screenshot(window: MainWindow, controller: Controller, path: Path) -> None:
+    """Write a picture of the window once everything on it is exact."""
+    finish(window, controller)
+    controller.save_screenshot(path)
+    print(f"wrote {path}")
+
+
+def drag(row: CovariateRow, start: float, end: float) -> None:
+    """Drag a slider between two shares of its range with the mouse, letting the window follow."""
+    slider = row.slider
+    middle = slider.height() // 2
+    usable = slider.width() - HANDLE_PX
+
+    def place(share: float) -> QPoint:
+        return QPoint(round(HANDLE_PX / 2 + share * usable), middle)
+
+    QTest.mousePress(slider, Qt.MouseButton.LeftButton, pos=place(start))
+    for step in range(1, DRAG_STEPS + 1):
+        QTest.mouseMove(slider, place(start + (end - start) * step / DRAG_STEPS))
+        pause(FRAME_S)
+    QTest.mouseRelease(slider, Qt.MouseButton.LeftButton, pos=place(end))
+
+
+def run_demo(window: MainWindow, controller: Controller, folder: Path) -> None:
+    """Drag every slider from end to end with real mouse events; leave pictures and meshes behind.
+
+    Raises:
+        InputError: when the window reports an error.
+    """
+
+    def picture(name: str) -> None:
+        finish(window, controller)
+        controller.save_screenshot(folder / f"{name}.png")
+
+    picture("start")
+    for name, row in window.covariates.rows.items():
+        drag(row, 0.5, 1.0)
+        picture(f"{name}-high")
+        drag(row, 1.0, 0.0)
+        picture(f"{name}-low")
+        row.reset.click()
+        print(f"dragged {name} from {row.reach}", flush=True)
+    controller.set_layout(Layout.FULL_SHAPE)
+    picture("full-shape")
+    atlas = controller.state.atlas
+    assert atlas is not None
+    controller.export(ExportChoice(all_panels(atlas), "stl", EXACT_RESOLUTION, folder))
+    finish(window, controller)
+    print(f"wrote pictures and meshes into {folder.absolute()}")

@@ -1,0 +1,91 @@
+"""What is asked of the engine and what comes back; a request holds all it needs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from naisr_viewer.state import Named, Panel
+
+PREVIEW_RESOLUTION = 40
+"""Lattice points per edge while a slider moves."""
+
+EXACT_RESOLUTION = 128
+"""Lattice points per edge at rest."""
+
+FORMATS = ("stl", "ply", "obj", "vtp", "glb")
+"""Mesh files that can be written."""
+
+
+@dataclass(frozen=True)
+class SurfaceRequest:
+    """One surface of one atlas, like a function call written down.
+
+    Attributes:
+        atlas: the file of the atlas.
+        panel: which of its surfaces.
+        values: the covariate values (real units) the surface depends on.
+        resolution: lattice points per edge of the box.
+    """
+
+    atlas: Path
+    panel: Panel
+    values: Named
+    resolution: int
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceResult:
+    """A surface ready to be drawn.
+
+    Attributes:
+        request: the question this answers.
+        points_mm: vertices in millimetres, float32 ``[n, 3]``.
+        normals: outward unit normals at the vertices, float32 ``[n, 3]``.
+        faces: vertex numbers of the triangles, int64 ``[m, 3]``; none where no surface exists.
+        volume_cm3: enclosed volume.
+        seconds: how long it took to compute; equal surfaces share one computation and its arrays.
+    """
+
+    request: SurfaceRequest
+    points_mm: NDArray[np.float32]
+    normals: NDArray[np.float32]
+    faces: NDArray[np.int64]
+    volume_cm3: float
+    seconds: float
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether this is as fine as the window shows at rest."""
+        return self.request.resolution >= EXACT_RESOLUTION
+
+
+def answers(result: SurfaceResult | None, request: SurfaceRequest) -> bool:
+    """Whether ``result`` shows what ``request`` asks for, at least as finely."""
+    return (
+        result is not None
+        and result.request.atlas == request.atlas
+        and result.request.panel == request.panel
+        and result.request.values == request.values
+        and result.request.resolution >= request.resolution
+    )
+
+
+@dataclass(frozen=True)
+class ExportChoice:
+    """What to write and where.
+
+    Attributes:
+        panels: the surfaces.
+        format: one of :data:`FORMATS`.
+        resolution: lattice points per edge.
+        folder: made when it is missing.
+    """
+
+    panels: tuple[Panel, ...]
+    format: str
+    resolution: int
+    folder: Path

@@ -1,0 +1,158 @@
+"""A stand-in for a trained atlas whose surfaces are known in closed form, and windows that close."""
+
+from __future__ import annotations
+
+import gc
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from PySide6.QtCore import QSettings
+from pytestqt.qtbot import QtBot
+
+from naisr_model.covariates import Covariate, Population
+from naisr_model.errors import Cancelled, InputError
+from naisr_model.frames import Frame
+from naisr_viewer.controller import Controller
+from naisr_viewer.engine import Engine
+from naisr_viewer.state import AtlasCard
+from naisr_viewer.views.main_window import MainWindow
+from naisr_viewer.worker import Worker
+
+AGE = Covariate("age", "months", "continuous", 100.0, 60.0, (1.0, 220.0))
+WEIGHT = Covariate("weight", "kg", "continuous", 35.0, 20.0, (4.0, 95.0))
+SEX = Covariate("sex", "", "binary", 0.0, 1.0, (-1.0, 1.0), ("F", "M"))
+COVARIATES = (AGE, WEIGHT, SEX)
+
+
+def people(count: int = 200) -> Population:
+    """Children whose weight grows with their age."""
+    rng = np.random.default_rng(0)
+    age = rng.uniform(1, 220, count)
+    weight = np.clip(4 + 0.31 * age + rng.normal(0, 3, count), 4, 95)
+    sex = rng.choice([-1.0, 1.0], count)
+    return Population(
+        covariates=COVARIATES,
+        subjects=tuple(f"s{i}" for i in range(count)),
+        visits=("1",) * count,
+        values=np.stack([age, weight, sex], axis=1),
+        held_out=np.arange(count) % 5 == 0,
+    )
+
+
+class EllipsoidAtlas:
+    """Ellipsoids: age makes them longer, weight wider, sex deeper.
+
+    Half-axes in mm are (20 + 0.1 (weight - 35), 20 + 3 sex, 45 + 0.15 (age - 100)).
+    """
+
+    def __init__(self, name: str = "ellipsoid", step_s: float = 0.0, steps: int = 1) -> None:
+        self.name = name
+        self.population = people()
+        self.covariates = COVARIATES
+        self.frame = Frame((0.0, 0.0, 0.0), 100.0)
+        self.step_s, self.steps = step_s, steps
+        self.calls: list[tuple[str, dict[str, float], int]] = []
+        self.running = 0
+        self.cancelled = 0
+
+    @staticmethod
+    def half_axes_mm(
+        age: float = 100.0, weight: float = 35.0, sex: float = 0.0
+    ) -> tuple[float, float, float]:
+        return 20 + 0.1 * (weight - 35), 20 + 3 * sex, 45 + 0.15 * (age - 100)
+
+    def volume_cm3(self, **values: float) -> float:
+        """The true volume."""
+        return 4 / 3 * np.pi * float(np.prod(self.half_axes_mm(**values))) / 1000
+
+    def template(self, resolution=128, *, progress=None, should_stop=None):
+        return self._surface("template", {}, resolution, progress, should_stop)
+
+    def effect(
+        self, name, value, latent=None, resolution=128, *, extrapolate=False, progress=None, should_stop=None
+    ):
+        return self._surface(name, {name: value}, resolution, progress, should_stop)
+
+    def shape(
+        self, covariates, latent=None, resolution=128, *, extrapolate=False, progress=None, should_stop=None
+    ):
+        return self._surface("shape", dict(covariates), resolution, progress, should_stop)
+
+    def _surface(self, what, values, resolution, progress, should_stop):
+        self.calls.append((what, values, resolution))
+        self.running += 1
+        try:
+            for step in range(self.steps):
+                if should_stop is not None and should_stop():
+                    self.cancelled += 1
+                    raise Cancelled
+                time.sleep(self.step_s)
+                if progress is not None:
+                    progress((step + 1) / self.steps)
+        finally:
+            self.running -= 1
+        mesh = trimesh.creation.icosphere(subdivisions=2 if resolution < 100 else 4)
+        mesh.vertices *= self.half_axes_mm(**values)
+        return mesh
+
+
+@pytest.fixture
+def atlas() -> EllipsoidAtlas:
+    return EllipsoidAtlas()
+
+
+@pytest.fixture
+def atlas_file(tmp_path: Path) -> Path:
+    """A file that stands for the atlas; what is in it does not matter."""
+    path = tmp_path / "ellipsoid.safetensors"
+    path.write_bytes(b"stand-in")
+    return path
+
+
+@pytest.fixture
+def engine(atlas: EllipsoidAtlas) -> Engine:
+    def load(path: Path):
+        if path.read_bytes() != b"stand-in":
+            raise InputError(f"{path.name} is not an atlas file; choose a .safetensors made by 'naisr train'")
+        return atlas
+
+    return Engine(load)
+
+
+@pytest.fixture
+def card(engine: Engine, atlas_file: Path) -> AtlasCard:
+    return engine.open(atlas_file)
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> QSettings:
+    return QSettings(str(tmp_path / "settings.ini"), QSettings.Format.IniFormat)
+
+
+@pytest.fixture
+def open_window(
+    qtbot: QtBot, engine: Engine, settings: QSettings
+) -> Iterator[Callable[..., tuple[MainWindow, Controller]]]:
+    """Windows with a worker thread, closed at the end."""
+    made = []
+
+    def make(size: tuple[int, int] = (960, 640)) -> tuple[MainWindow, Controller]:
+        window = MainWindow()
+        controller = Controller(window, engine, Worker(), settings)
+        made.append((window, controller))
+        window.resize(*size)
+        window.show()
+        qtbot.waitExposed(window)
+        return window, controller
+
+    yield make
+    for window, _ in made:
+        window.close()
+        window.deleteLater()
+    made.clear()
+    qtbot.wait(0)
+    gc.collect()

@@ -1,0 +1,158 @@
+"""Sliders, numbers and buttons, alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+from pytestqt.qtbot import QtBot
+
+from naisr_model.covariates import Covariate
+from naisr_viewer.state import ExplorerState, opened, with_value
+from naisr_viewer.views import covariate_panel as cp
+from naisr_viewer.views.theme import DARK, LIGHT, covariate_colour
+
+
+@pytest.fixture
+def panel(qtbot: QtBot, card) -> cp.CovariatePanel:
+    panel = cp.CovariatePanel()
+    qtbot.addWidget(panel)
+    panel.show_atlas(card, LIGHT)
+    panel.show_values(opened(ExplorerState(), card))
+    panel.resize(cp.PANEL_WIDTH, 700)
+    panel.show()
+    qtbot.waitExposed(panel)
+    return panel
+
+
+@pytest.fixture
+def heard(panel) -> list[tuple[str, str, float]]:
+    acts: list[tuple[str, str, float]] = []
+    panel.value_moved.connect(lambda name, value: acts.append(("moved", name, value)))
+    panel.value_settled.connect(lambda name, value: acts.append(("settled", name, value)))
+    return acts
+
+
+def at(slider: cp.JumpSlider, share: float) -> QPoint:
+    x = cp.HANDLE_PX / 2 + share * (slider.width() - cp.HANDLE_PX)
+    return QPoint(round(x), slider.height() // 2)
+
+
+def test_slider_positions_and_real_values_agree(card):
+    for covariate in card.covariates:
+        for value in np.linspace(covariate.range[0], covariate.range[1], 7):
+            position = cp.slider_position(covariate, value)
+            step = (covariate.range[1] - covariate.range[0]) / cp.SLIDER_STEPS
+            assert abs(cp.slider_value(covariate, position) - value) <= step
+
+
+def test_digits_suit_the_range():
+    def of(low: float, high: float) -> int:
+        return cp.decimals(Covariate("x", "", "continuous", 0, 1, (low, high)))
+
+    assert (of(1, 233), of(3.9, 94), of(0, 1), of(0, 5000)) == (0, 1, 2, 0)
+
+
+def test_the_histogram_counts_everybody(card):
+    for covariate in card.covariates:
+        observed = card.population.observed(covariate.name)
+        assert cp.bin_counts(covariate, observed).sum() == len(observed)
+    assert len(cp.bin_counts(card.covariates[2], np.array([-1.0, -1.0, 1.0]))) == 2
+
+
+def test_showing_a_value_says_nothing(panel, heard, card):
+    state = with_value(opened(ExplorerState(), card), "age", 180)
+    panel.show_values(with_value(state, "sex", 1))
+    assert panel.rows["age"].spin.value() == 180
+    assert panel.rows["age"].slider.value() == cp.slider_position(card.covariates[0], 180)
+    assert [button.isChecked() for button in panel.rows["sex"].buttons] == [False, True]
+    assert heard == []
+
+
+def test_a_drag_moves_on_the_way_and_settles_on_release(panel, heard):
+    slider = panel.rows["age"].slider
+    QTest.mousePress(slider, Qt.MouseButton.LeftButton, pos=at(slider, 0.5))
+    for share in (0.6, 0.7, 0.8):
+        QTest.mouseMove(slider, at(slider, share))
+    assert {kind for kind, _, _ in heard} == {"moved"}
+    QTest.mouseRelease(slider, Qt.MouseButton.LeftButton, pos=at(slider, 0.8))
+    assert [kind for kind, _, _ in heard].count("settled") == 1
+    kind, name, value = heard[-1]
+    assert (kind, name) == ("settled", "age")
+    assert value == pytest.approx(1 + 0.8 * 219, abs=2)
+    QTest.qWait(2 * cp.SETTLE_MS)
+    assert heard[-1] == (kind, name, value)
+
+
+def test_a_click_brings_the_handle_there(panel, heard):
+    slider = panel.rows["weight"].slider
+    QTest.mouseClick(slider, Qt.MouseButton.LeftButton, pos=at(slider, 0.25))
+    assert heard[-1][:2] == ("settled", "weight")
+    assert heard[-1][2] == pytest.approx(4 + 0.25 * 91, abs=1)
+    assert slider.handle_x() == pytest.approx(at(slider, 0.25).x(), abs=1)
+
+
+def test_other_buttons_do_nothing(panel, heard):
+    slider = panel.rows["weight"].slider
+    QTest.mouseClick(slider, Qt.MouseButton.RightButton, pos=at(slider, 0.25))
+    assert heard == []
+
+
+def test_several_keys_are_one_change(panel, heard, qtbot):
+    slider = panel.rows["age"].slider
+    slider.setFocus()
+    for _ in range(3):
+        QTest.keyClick(slider, Qt.Key.Key_Right)
+    assert [kind for kind, _, _ in heard] == ["moved"] * 3
+    qtbot.waitUntil(lambda: heard[-1][0] == "settled", timeout=2000)
+    assert heard[-1][2] == heard[2][2]
+
+
+def test_a_typed_number_is_taken_exactly(panel, heard, qtbot):
+    spin = panel.rows["weight"].spin
+    spin.selectAll()
+    QTest.keyClicks(spin, "42.5")
+    assert heard == []  # not before it is finished
+    QTest.keyClick(spin, Qt.Key.Key_Return)
+    qtbot.waitUntil(lambda: ("settled", "weight", 42.5) in heard, timeout=2000)
+
+
+def test_a_binary_covariate_is_chosen_or_dragged_between(panel, heard):
+    row = panel.rows["sex"]
+    QTest.mouseClick(row.buttons[1], Qt.MouseButton.LeftButton)
+    assert heard[-1] == ("settled", "sex", 1.0)
+    QTest.mouseClick(row.slider, Qt.MouseButton.LeftButton, pos=at(row.slider, 0.25))
+    assert heard[-1][2] == pytest.approx(-0.5, abs=0.02)
+    row.set_value(-0.5)
+    assert "between F and M" in row.reading.text()
+    row.set_value(-1.0)
+    assert row.reading.text() == "F"
+
+
+def test_resets_are_asked_for(panel, qtbot):
+    panel.rows["age"].set_value(50)
+    with qtbot.waitSignal(panel.reset_requested) as asked:
+        QTest.mouseClick(panel.rows["age"].reset, Qt.MouseButton.LeftButton)
+    assert asked.args == ["age"]
+    assert not panel.rows["weight"].reset.isEnabled()  # it is at the mean already
+    with qtbot.waitSignal(panel.reset_all_requested):
+        QTest.mouseClick(panel.reset_all, Qt.MouseButton.LeftButton)
+
+
+def test_units_and_colours_are_on_every_row(panel, card):
+    for covariate in card.covariates:
+        row = panel.rows[covariate.name]
+        texts = [child.text() for child in row.findChildren(cp.QLabel)]
+        assert covariate.name.capitalize() in texts
+        assert covariate.unit in texts
+        assert covariate_colour(card, covariate.name) in row.slider.styleSheet()
+    panel.set_theme(DARK)
+    assert DARK.raised in panel.rows["age"].slider.styleSheet()
+
+
+def test_another_atlas_replaces_the_rows(panel, card, qtbot):
+    old = panel.rows["age"]
+    panel.show_atlas(card, LIGHT)
+    assert panel.rows["age"] is not old
+    assert list(panel.rows) == ["age", "weight", "sex"]

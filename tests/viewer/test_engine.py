@@ -1,0 +1,120 @@
+"""Requests answered by a stand-in atlas whose volumes are known in closed form."""
+
+from __future__ import annotations
+
+import inspect
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from naisr_model.atlas import Atlas
+from naisr_model.errors import Cancelled, InputError
+from naisr_model.frames import Frame
+from naisr_viewer.engine import CACHED_SURFACES, Engine
+from naisr_viewer.requests import SurfaceRequest, answers
+from naisr_viewer.state import FULL_SHAPE, TEMPLATE, Panel
+
+
+def ask(path: Path, panel: Panel = FULL_SHAPE, resolution: int = 128, **values: float) -> SurfaceRequest:
+    return SurfaceRequest(path, panel, tuple(values.items()), resolution)
+
+
+@pytest.mark.parametrize("method", ["shape", "effect", "template"])
+def test_the_stand_in_is_called_like_the_real_atlas(atlas, method):
+    real, stand_in = (inspect.signature(getattr(kind, method)) for kind in (Atlas, type(atlas)))
+    assert list(stand_in.parameters) == list(real.parameters)
+
+
+def test_surfaces_have_the_true_volume(engine, card, atlas):
+    cases: list[tuple[Panel, dict[str, float]]] = [
+        (TEMPLATE, {}),
+        (Panel("effect", "age"), {"age": 200.0}),
+        (FULL_SHAPE, {"age": 20.0, "weight": 10.0, "sex": 1.0}),
+    ]
+    for panel, values in cases:
+        result = engine.surface(SurfaceRequest(card.path, panel, tuple(values.items()), 128))
+        assert result.volume_cm3 == pytest.approx(atlas.volume_cm3(**values), rel=0.01)
+        assert result.is_exact
+
+
+def test_normals_are_unit_and_point_outwards(engine, card):
+    result = engine.surface(ask(card.path))
+    np.testing.assert_allclose(np.linalg.norm(result.normals, axis=1), 1, atol=1e-5)
+    assert (np.sum(result.normals * result.points_mm, axis=1) > 0).all()
+
+
+def test_an_answer_is_remembered(engine, card, atlas):
+    first = engine.surface(ask(card.path, age=50.0))
+    assert engine.surface(ask(card.path, age=50.0)).points_mm is first.points_mm
+    remembered = engine.cached(ask(card.path, age=50.0))
+    assert remembered is not None
+    assert remembered.request == first.request
+    assert engine.cached(ask(card.path, age=51.0)) is None
+    assert len(atlas.calls) == 1
+
+
+def test_equal_surfaces_are_computed_once(engine, card, atlas):
+    template = engine.surface(ask(card.path, TEMPLATE))
+    at_mean = engine.surface(ask(card.path, age=100.0, weight=35.0, sex=0.0))
+    effect = engine.surface(ask(card.path, Panel("effect", "age"), age=60.0))
+    alone = engine.surface(ask(card.path, age=60.0, weight=35.0, sex=0.0))
+    assert at_mean.points_mm is template.points_mm
+    assert alone.points_mm is effect.points_mm
+    assert at_mean.request.panel == FULL_SHAPE  # each still answers its own question
+    assert [what for what, _, _ in atlas.calls] == ["template", "age"]
+    engine.surface(ask(card.path, age=60.0, weight=36.0, sex=0.0))
+    assert [what for what, _, _ in atlas.calls] == ["template", "age", "shape"]
+
+
+def test_the_memory_is_bounded(engine, card):
+    for age in range(CACHED_SURFACES + 5):
+        engine.surface(ask(card.path, resolution=40, age=float(age)))
+    assert engine.cached(ask(card.path, resolution=40, age=0.0)) is None
+    assert engine.cached(ask(card.path, resolution=40, age=float(CACHED_SURFACES))) is not None
+
+
+def test_opening_a_file_again_forgets_its_old_surfaces(engine, card):
+    engine.surface(ask(card.path))
+    engine.open(card.path)
+    assert engine.cached(ask(card.path)) is None
+
+
+def test_cancelling_is_passed_on(engine, card):
+    with pytest.raises(Cancelled):
+        engine.surface(ask(card.path), should_stop=lambda: True)
+    assert engine.cached(ask(card.path)) is None
+
+
+def test_progress_is_passed_on(engine, card):
+    seen: list[float] = []
+    engine.surface(ask(card.path), seen.append)
+    assert seen[-1] == 1.0
+
+
+def test_no_surface_is_an_answer_too(engine, card, atlas, monkeypatch):
+    monkeypatch.setattr(atlas, "_surface", lambda *_: trimesh.Trimesh())
+    result = engine.surface(ask(card.path))
+    assert result.faces.shape == (0, 3)
+    assert result.points_mm.shape == (0, 3)
+    assert result.volume_cm3 == 0.0
+
+
+def test_a_missing_file_is_named(engine, tmp_path):
+    with pytest.raises(InputError, match="nowhere"):
+        engine.open(tmp_path / "nowhere.safetensors")
+
+
+def test_an_atlas_of_curves_is_refused_in_words(atlas, atlas_file):
+    atlas.frame = Frame((0.0, 0.0), 1.0)
+    with pytest.raises(InputError, match="2D"):
+        Engine(lambda _: atlas).open(atlas_file)
+
+
+def test_a_finer_surface_answers_a_coarser_question(engine, card):
+    fine = engine.surface(ask(card.path, age=50.0))
+    assert answers(fine, ask(card.path, resolution=40, age=50.0))
+    assert not answers(fine, ask(card.path, resolution=256, age=50.0))
+    assert not answers(fine, ask(card.path, resolution=40, age=51.0))
+    assert not answers(None, ask(card.path))
