@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import json
+import math
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -120,7 +121,7 @@ def train(
     from naisr_model.data.store import SampleStore
     from naisr_model.learning.train import train as run
 
-    budget = None if time_budget is None else _seconds(time_budget)
+    budget = math.inf if time_budget is None else _seconds(time_budget)
     chosen = named(preset) if config is None else read_toml(config, named(preset))
     changes: dict[str, Any] = {"epochs": epochs, "seed": seed}
     training = dataclasses.replace(chosen.training, **{k: v for k, v in changes.items() if v is not None})
@@ -166,18 +167,22 @@ def mesh(
     from naisr_model.atlas import Atlas
     from naisr_model.files import replacing
 
+    if out.suffix.lower() not in (".stl", ".ply", ".obj", ".glb"):
+        raise InputError(f"cannot write '{out.suffix}'; name the file .stl, .ply, .obj or .glb")
+    if template and (effect is not None or set):
+        raise InputError("the template depends on no covariate; leave out --effect and --set")
     loaded = Atlas.load(atlas)
     values = _values(loaded, set or [])
     if template:
         surface = loaded.template(resolution)
     elif effect is not None:
-        if effect not in values:
-            raise InputError(f"--effect {effect} needs its value, as --set {effect}=VALUE")
+        if values.keys() != {effect}:
+            raise InputError(f"--effect {effect} needs its value and no other, as --set {effect}=VALUE")
         surface = loaded.effect(effect, values[effect], None, resolution, extrapolate=extrapolate)
     else:
         surface = loaded.shape(values, None, resolution, extrapolate=extrapolate)
-    if out.suffix.lower() not in (".stl", ".ply", ".obj", ".glb"):
-        raise InputError(f"cannot write '{out.suffix}'; name the file .stl, .ply, .obj or .glb")
+    if not len(surface.faces):
+        raise InputError("there is no surface at these covariates; choose values nearer to the data")
     with replacing(out) as temporary:
         surface.export(temporary)
     print(f"{out}: {len(surface.faces)} faces, {surface.volume / 1000:.2f} cm³")
@@ -235,6 +240,10 @@ def reconstruction(
     from naisr_model.evaluation.tables import PUBLISHED_AIRWAY, reconstruction_markdown
     from naisr_model.files import replacing
 
+    if steps < 1 or limit < 0:
+        raise InputError(
+            f"--steps {steps} --limit {limit} make no sense; give at least 1 step, limit 0 or more"
+        )
     loaded = Atlas.load(atlas)
     config = EvaluationConfig(limit=limit)
     config = dataclasses.replace(config, fit=dataclasses.replace(config.fit, steps=steps))
@@ -271,7 +280,7 @@ def _seconds(text: str) -> float:
         seconds = factor * float(text[:-1])
     except ValueError:
         seconds = 0.0
-    if not seconds > 0:
+    if not 0 < seconds < math.inf:
         raise InputError(f"the time budget is '{text}'; write it as 90s, 45m or 1.5h")
     return seconds
 
@@ -299,14 +308,13 @@ def _training_bar() -> Iterator[Callable[[Any], None]]:
         ),
     )
     with Progress(*columns, console=_console) as bar:
-        task = bar.add_task("training", total=None, epoch=0, loss=float("nan"), speed=0.0, left="?")
+        task = bar.add_task("training", total=1.0, epoch=0, loss=float("nan"), speed=0.0, left="?")
 
         def report(told: Any) -> None:
             minutes, seconds = divmod(int(told.seconds_left), 60)
             bar.update(
                 task,
-                completed=told.iteration,
-                total=told.iterations,
+                completed=told.share,
                 epoch=told.epoch,
                 loss=told.losses["total"],
                 speed=told.points_per_second,
@@ -352,6 +360,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
     except (InputError, CycloptsError) as error:
         print(f"naisr: {error}", file=sys.stderr)
+        return 2
+    except OSError as error:
+        print(f"naisr: {error.strerror or error}: {error.filename or ''}", file=sys.stderr)
         return 2
     except (Cancelled, KeyboardInterrupt):
         print("naisr: stopped; what was finished is kept", file=sys.stderr)

@@ -354,7 +354,8 @@ class Controller(QObject):
         assert self.state.atlas is not None
         if len(result.faces) == 0:
             return "no surface at these values", "The signed distance is nowhere zero inside the box."
-        text = f'<span style="font-size:12pt">{result.volume_cm3:.1f} cm³</span>'
+        digits = 1 if result.volume_cm3 < 1000 else 0
+        text = f'<span style="font-size:12pt">{result.volume_cm3:,.{digits}f} cm³</span>'
         if is_seen(self.state.atlas.population, dict(result.request.values)):
             return text, "Enclosed volume"
         return f"{text}<br>{UNSEEN}", UNSEEN_HINT

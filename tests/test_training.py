@@ -1,11 +1,11 @@
 """Training on shapes whose covariate effects are known."""
 
 import dataclasses
+import itertools
 import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,7 @@ from eggs import egg, egg_preset
 
 from naisr_model.atlas import Atlas
 from naisr_model.checkpoint import load
-from naisr_model.config import FitConfig
+from naisr_model.config import PRESETS, FitConfig, LossWeights
 from naisr_model.errors import Cancelled, InputError
 from naisr_model.learning import train as training
 from naisr_model.learning.fit import fit_latents
@@ -41,7 +41,7 @@ def test_the_effects_are_those_of_the_population(egg_atlas):
 
 def test_the_checkpoint_tells_how_it_was_trained(egg_atlas):
     record = load(egg_atlas).training
-    assert record["iterations"] == record["planned_iterations"] == 600
+    assert record["iterations"] == 600
     assert record["folded_share"] < 0.01
     templates = sorted((egg_atlas.parent / (egg_atlas.name + ".training") / "templates").iterdir())
     assert [path.name for path in templates][-1] == "epoch_00100.ply"
@@ -97,21 +97,62 @@ def test_other_settings_do_not_continue_a_training(egg_store, tmp_path):
         train(egg_store, egg_preset(epochs=2), out)
 
 
+def test_other_data_do_not_continue_a_training(egg_store, tmp_path):
+    out, preset = tmp_path / "a.safetensors", egg_preset(epochs=1)
+    train(egg_store, preset, out)
+    population = dataclasses.replace(egg_store.population, values=egg_store.population.values[::-1].copy())
+    with pytest.raises(InputError, match="other settings or data"):
+        train(dataclasses.replace(egg_store, population=population), preset, out)
+
+
+def test_settings_that_do_not_fit_are_refused(egg_store, tmp_path):
+    flat = dataclasses.replace(egg_preset(1), network=PRESETS["paper-starman"].network)
+    with pytest.raises(InputError, match="2D shapes and the store holds 3D"):
+        train(egg_store, flat, tmp_path / "a.safetensors")
+    with pytest.raises(InputError, match="cannot compute on 'abacus'"):
+        train(egg_store, egg_preset(1), tmp_path / "a.safetensors", device="abacus")
+
+
+def diverging(preset):
+    return dataclasses.replace(preset, training=dataclasses.replace(preset.training, template_rate=30.0))
+
+
 def test_divergence_stops_with_advice_and_keeps_the_last_good_state(egg_store, tmp_path, monkeypatch):
     monkeypatch.setattr(training, "SAVE_SECONDS", 0.0)
-    preset = egg_preset(epochs=50)
-    wild = dataclasses.replace(preset, training=dataclasses.replace(preset.training, template_rate=30.0))
+    losses: list[float] = []
     out = tmp_path / "wild.safetensors"
     with pytest.raises(InputError, match=r"broke down.*last good state is in .*template_rate below 30"):
-        train(egg_store, wild, out)
-    assert all(torch.isfinite(tensor).all() for tensor in load(out).weights.values())
+        train(
+            egg_store,
+            diverging(egg_preset(epochs=50)),
+            out,
+            report=lambda r: losses.append(r.losses["total"]),
+        )
+    kept = load(out)
+    assert kept.training["iterations"] == 0  # the first step already leaves every good state
+    assert all((tensor.abs() < 10).all() for tensor in kept.weights.values())
 
 
-def test_a_time_budget_bounds_the_training(egg_store, tmp_path):
-    started = time.monotonic()
-    checkpoint = train(egg_store, egg_preset(epochs=100_000), tmp_path / "b.safetensors", time_budget_s=2.0)
-    assert 20 <= checkpoint.training["iterations"] < 100_000
-    assert time.monotonic() - started < 30
+def test_nan_stops_a_training_at_once(egg_store, tmp_path, monkeypatch):
+    nothing = lambda *_, **__: {"broken": torch.tensor(float("nan"), requires_grad=True)}  # noqa: E731
+    monkeypatch.setattr(training, "latent_term", nothing)
+    with pytest.raises(InputError, match=r"iteration 0 \(loss nan\); no good state"):
+        train(egg_store, egg_preset(epochs=1), tmp_path / "nan.safetensors")
+
+
+def test_a_time_budget_bounds_the_training_over_all_its_runs(egg_store, tmp_path, monkeypatch):
+    clock = itertools.count(step=0.01)
+    monkeypatch.setattr(training.time, "monotonic", lambda: next(clock))
+    out, preset = tmp_path / "b.safetensors", egg_preset(epochs=100_000)
+    seen: list[training.Report] = []
+    with pytest.raises(Cancelled):
+        train(
+            egg_store, preset, out, time_budget_s=1.0, report=seen.append, should_stop=lambda: len(seen) > 9
+        )
+    checkpoint = train(egg_store, preset, out, time_budget_s=1.0, report=seen.append)
+    assert checkpoint.training["seconds"] == pytest.approx(1.0, abs=0.05)
+    assert seen[-1].share >= 1 and 20 < len(seen) < 110
+    assert [told.iteration for told in seen] == list(range(1, len(seen) + 1))
 
 
 def test_fitting_recovers_the_code_of_a_shape_the_atlas_can_make(egg_atlas):
@@ -124,19 +165,14 @@ def test_fitting_recovers_the_code_of_a_shape_the_atlas_can_make(egg_atlas):
     with torch.inference_mode():
         target = network(points, covariates, latent)[0]
     batch = Batch(points[:, :1], torch.ones(1, 1, 3), points.clone(), target.clone())
-    weights = dataclasses.replace(
-        checkpoint.preset.training.loss,
-        surface_eikonal=0.0,
-        surface_distance=0.0,
-        surface_normal=0.0,
-        space_eikonal=0.0,
-        latent=1e-4,
+    only_distances = LossWeights(
+        surface_eikonal=0.0, surface_distance=0.0, surface_normal=0.0, space_eikonal=0.0, latent=1e-4
     )
     config = FitConfig(steps=300, rate=2e-2)
-    found = fit_latents(network, lambda rng: batch, covariates, config, weights)
+    found = fit_latents(network, lambda rng: batch, covariates, config, only_distances)
     with torch.inference_mode():
         missed = (network(points, covariates, found)[0] - target).abs().mean()
         without = (network(points, covariates, torch.zeros_like(found))[0] - target).abs().mean()
     assert missed < 0.2 * without + 1e-5
     with pytest.raises(Cancelled):
-        fit_latents(network, lambda rng: batch, covariates, config, weights, should_stop=lambda: True)
+        fit_latents(network, lambda rng: batch, covariates, config, only_distances, should_stop=lambda: True)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import itertools
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from naisr_model.atlas import Atlas
 from naisr_model.config import FitConfig
 from naisr_model.covariates import Covariate, Population, normalised_vector
 from naisr_model.data.align import rigid_transform
+from naisr_model.data.populations import POPULATIONS, PopulationModule
 from naisr_model.data.populations import population as population_module
 from naisr_model.data.samples import ShapeSamples, sample_shape
 from naisr_model.data.store import SampleStore
@@ -24,7 +25,7 @@ from naisr_model.evaluation.metrics import compare, component_count, hausdorff_x
 from naisr_model.evaluation.tables import TruthPoint, reconstruction_report
 from naisr_model.learning.fit import fit_latents
 from naisr_model.learning.objective import Batch
-from naisr_model.surface.fields import folded
+from naisr_model.surface.folding import folded_shares
 
 Progress = Callable[[float], None]
 StopCheck = Callable[[], bool]
@@ -32,7 +33,7 @@ StopCheck = Callable[[], bool]
 SAMPLES_OF_A_FIT = 20_000
 NEIGHBOURS, NEIGHBOUR_DISTANCE = 3, 0.25
 EFFECT_VALUES = 9
-FOLDING_SHAPES, FOLDING_POINTS = 40, 2000
+FOLDING_SHAPES, FOLDING_RESOLUTION = 40, 64
 FITTED_AT_ONCE = 4
 """Shapes fitted together: their activations stay in the processor's cache."""
 
@@ -49,7 +50,7 @@ class EvaluationConfig:
     """
 
     fit: FitConfig = field(default_factory=lambda: FitConfig(steps=200, surface_points=128, space_points=128))
-    resolution: int = 128
+    resolution: int = 192
     check_resolution: int = 96
     limit: int = 0
 
@@ -81,39 +82,44 @@ def evaluate(
         Cancelled: when ``should_stop()`` turned true.
     """
     shapes = held_out_shapes(atlas, store, config.limit or None)
-    latents = fit_all(atlas, shapes, config.fit, _part(progress, 0.0, 0.7), should_stop)
+    if not shapes:
+        raise InputError("no shape was held out, so nothing can be evaluated; prepare with --held-out 0.2")
+    latents = fit_all(atlas, shapes, config.fit, _part(progress, 0.0, 0.5), should_stop)
     distances, components = [], []
     for done, (shape, latent) in enumerate(zip(shapes, latents, strict=True), start=1):
         fitted = atlas.shape(
             shape.values, latent, config.resolution, extrapolate=True, should_stop=should_stop
         )
-        distances.append(compare(shape.mesh_mm, fitted))
         components.append(component_count(fitted))
-        _tell(progress, 0.7 + 0.15 * done / len(shapes))
-    growth, effects = truth_points(atlas, config.resolution)
-    _tell(progress, 0.9)
-    components += [component_count(mesh) for mesh in _population_shapes(atlas, config.check_resolution)]
-    report = reconstruction_report(
+        if len(fitted.faces):
+            distances.append(compare(shape.mesh_mm, fitted))
+        _tell(progress, 0.5 + 0.2 * done / len(shapes))
+    growth, effects, template = truth_points(
+        atlas, config.resolution, _part(progress, 0.7, 0.85), should_stop
+    )
+    latest = _part(progress, 0.85, 1.0)
+    plausible, corners = population_components(atlas, config.check_resolution, latest, should_stop)
+    return reconstruction_report(
         distances,
-        components=components,
-        folded_share=folded_share(atlas, config.check_resolution),
+        components=components + plausible,
+        folded_share=folded_share(atlas),
         growth=growth,
         effects=effects,
+        template=template,
+        corner_components=corners,
+        mean_displacement_mm=mean_displacement_mm(atlas, shapes[0].mesh_mm),
+        without_surface=len(shapes) - len(distances),
     )
-    corners = [component_count(mesh) for mesh in _corner_shapes(atlas, config.check_resolution)]
-    report["corner_components"] = [min(corners), max(corners)]
-    report["template"] = _template_volume(atlas, config.resolution)
-    _tell(progress, 1.0)
-    return report
 
 
 def held_out_shapes(atlas: Atlas, store: SampleStore | None, limit: int | None = None) -> list[HeldOut]:
     """The first held-out shapes of a store, or of the synthetic population that the atlas was made from.
 
     Raises:
-        InputError: when the atlas was made from somebody's own data and no store is given.
+        InputError: when the atlas was made from somebody's own data and no store, or another, is given.
     """
     if store is not None:
+        _require_same_data(atlas, store)
         rows = np.flatnonzero(store.population.held_out)[:limit]
         return [HeldOut(store.population.row(int(row)), store.mesh(int(row))) for row in rows]
     module = _synthetic(atlas)
@@ -121,11 +127,8 @@ def held_out_shapes(atlas: Atlas, store: SampleStore | None, limit: int | None =
         raise InputError(
             "this atlas was made from data of your own; give the store it was trained on with --store"
         )
-    source, population = atlas.checkpoint.source, atlas.population
-    held_out = {
-        (population.subjects[row], population.visits[row])
-        for row in np.flatnonzero(population.held_out)[:limit]
-    }
+    source = atlas.checkpoint.source
+    held_out = _held_out_visits(atlas.population)[:limit]
     visits = module.visits(int(source["seed"]), int(source["patients"]))
     return [
         HeldOut(dict(visit.values), _aligned(atlas, *module.visit_shape(visit)))
@@ -134,9 +137,30 @@ def held_out_shapes(atlas: Atlas, store: SampleStore | None, limit: int | None =
     ]
 
 
-def _synthetic(atlas: Atlas) -> ModuleType | None:
-    name = atlas.checkpoint.source.get("population")
-    return population_module(str(name)) if name else None
+def _require_same_data(atlas: Atlas, store: SampleStore) -> None:
+    known, given = atlas.population, store.population
+    same = {
+        "covariates": known.covariates == given.covariates,
+        "frame": atlas.frame == store.frame,
+        "alignment": atlas.checkpoint.alignment == store.alignment,
+        "held-out shapes": _held_out_visits(known) == _held_out_visits(given),
+    }
+    if other := [name for name, equal in same.items() if not equal]:
+        raise InputError(
+            f"{store.path} is not the store that this atlas was trained on: other {', '.join(other)}"
+        )
+
+
+def _held_out_visits(population: Population) -> list[tuple[str, str]]:
+    rows = np.flatnonzero(population.held_out)
+    return [(population.subjects[row], population.visits[row]) for row in rows]
+
+
+def _synthetic(atlas: Atlas) -> PopulationModule | None:
+    """The population that an atlas records as its source and that can be made again."""
+    source = atlas.checkpoint.source
+    known = source.get("population") in POPULATIONS and {"seed", "patients"} <= set(source)
+    return population_module(str(source["population"])) if known else None
 
 
 def _aligned(
@@ -187,42 +211,54 @@ def _draw(samples: Sequence[ShapeSamples], config: FitConfig, rng: np.random.Gen
     return Batch.from_arrays(surface[..., :dim], surface[..., dim:], space[..., :dim], space[..., dim])
 
 
-def truth_points(atlas: Atlas, resolution: int) -> tuple[list[TruthPoint], list[TruthPoint]]:
-    """The atlas beside the truth along the growth path and along each covariate; empty for real data."""
+def truth_points(
+    atlas: Atlas,
+    resolution: int,
+    progress: Progress | None = None,
+    should_stop: StopCheck | None = None,
+) -> tuple[list[TruthPoint], list[TruthPoint], TruthPoint | None]:
+    """The atlas beside the truth; nothing for real data.
+
+    Returns:
+        Places along the growth path, places along each covariate, and the template.
+    """
     module = _synthetic(atlas)
     if module is None:
-        return [], []
-    growth = [
-        _compared(atlas, module, covariate, values, condition, resolution)
-        for covariate, condition, values in module.growth_path()
-    ]
+        return [], [], None
+    growth, centre = module.growth_path(), atlas.population.centre
     effects = [
-        _compared(
-            atlas, module, covariate.name, atlas.population.centre | {covariate.name: value}, "", resolution
-        )
+        (covariate.name, "", centre | {covariate.name: value})
         for covariate in atlas.covariates
         for value in plausible_values(atlas.population, covariate)
     ]
-    return growth, effects
+    places = [*growth, *effects, (atlas.covariates[0].name, "template", centre)]
+    points = []
+    for done, place in enumerate(places, start=1):
+        points.append(_compared(atlas, module, *place, resolution=resolution, should_stop=should_stop))
+        _tell(progress, done / len(places))
+    return points[: len(growth)], points[len(growth) : -1], points[-1]
 
 
 def _compared(
     atlas: Atlas,
-    module: ModuleType,
+    module: PopulationModule,
     covariate: str,
-    values: dict[str, float],
     condition: str,
+    values: dict[str, float],
+    *,
     resolution: int,
+    should_stop: StopCheck | None = None,
 ) -> TruthPoint:
+    """Phi(c, z = 0), which is Phi_i where only covariate i is off its centre, beside the true shape."""
     truth = _aligned(atlas, module.true_shape(values), module.true_landmarks(values))
-    shape = atlas.shape(values, resolution=resolution, extrapolate=True)
+    shape = atlas.shape(values, resolution=resolution, extrapolate=True, should_stop=should_stop)
     return TruthPoint(
         covariate=covariate,
         value=values[covariate],
         condition=condition,
         volume_cm3=shape.volume / 1000,
         truth_cm3=truth.volume / 1000,
-        hd_x100=hausdorff_x100(truth, shape),
+        hd_x100=hausdorff_x100(truth, shape) if len(shape.faces) else float("inf"),
     )
 
 
@@ -249,48 +285,65 @@ def plausible_values(population: Population, covariate: Covariate) -> list[float
     return [plausible[i] for i in chosen]
 
 
-def _population_shapes(atlas: Atlas, resolution: int) -> Iterator[trimesh.Trimesh]:
-    """Every training covariate vector at z = 0, then each slider from end to end."""
-    population = atlas.population
-    for row in np.flatnonzero(~population.held_out):
-        yield atlas.shape(population.row(int(row)), resolution=resolution)
-    for covariate in atlas.covariates:
-        for value in np.linspace(*covariate.range, 2 * EFFECT_VALUES):
-            yield atlas.effect(covariate.name, float(value), resolution=resolution)
+def population_components(
+    atlas: Atlas,
+    resolution: int,
+    progress: Progress | None = None,
+    should_stop: StopCheck | None = None,
+) -> tuple[list[int], list[int]]:
+    """Connected components of surfaces at z = 0.
+
+    Returns:
+        Those of every training covariate vector and of each slider from end to end, the others at
+        their mean; and those of the corners of the box of ranges, where there are no data.
+    """
+    population, ranges = atlas.population, [covariate.range for covariate in atlas.covariates]
+    training = [population.row(int(row)) for row in np.flatnonzero(~population.held_out)]
+    sliders = [
+        {covariate.name: float(value)}
+        for covariate in atlas.covariates
+        for value in np.linspace(*covariate.range, 2 * EFFECT_VALUES)
+    ]
+    corners = [
+        dict(zip(population.names, map(float, corner), strict=True)) for corner in itertools.product(*ranges)
+    ]
+    counts, places = [], [*training, *sliders, *corners]
+    for done, values in enumerate(places, start=1):
+        surface = atlas.shape(values, resolution=resolution, extrapolate=True, should_stop=should_stop)
+        counts.append(component_count(surface))
+        _tell(progress, done / len(places))
+    return counts[: -len(corners)], counts[-len(corners) :]
 
 
-def _corner_shapes(atlas: Atlas, resolution: int) -> Iterator[trimesh.Trimesh]:
-    """The corners of the box of ranges, where there are no data."""
-    ranges = [covariate.range for covariate in atlas.covariates]
-    for corner in np.stack(np.meshgrid(*ranges), axis=-1).reshape(-1, len(ranges)):
-        yield atlas.shape(
-            dict(zip(atlas.population.names, map(float, corner), strict=True)), resolution=resolution
-        )
+def folded_share(atlas: Atlas) -> float:
+    """Mean share of folded points near the surfaces of training shapes with their codes, z = 0 included."""
+    checkpoint = atlas.checkpoint
+    vectors = checkpoint.population.normalised()[~checkpoint.population.held_out]
+    some = np.random.default_rng(0).permutation(len(vectors))[:FOLDING_SHAPES]
+    covariates = torch.as_tensor(np.concatenate([vectors[some]] * 2), dtype=torch.float32)
+    latents = torch.as_tensor(checkpoint.latents[some])
+    both = torch.cat([latents, torch.zeros_like(latents)])
+    return float(np.nanmean(folded_shares(checkpoint.network(), covariates, both, FOLDING_RESOLUTION)))
 
 
-def folded_share(atlas: Atlas, resolution: int) -> float:
-    """Share of points on shapes of the training population (with their codes) where p + d(p) folds."""
-    checkpoint, population = atlas.checkpoint, atlas.population
-    rows = np.flatnonzero(~population.held_out)
-    rng, network = np.random.default_rng(0), checkpoint.network()
-    counts = []
-    for index in rng.permutation(len(rows))[:FOLDING_SHAPES]:
-        values, latent = population.row(int(rows[index])), checkpoint.latents[index]
-        vertices = atlas.shape(values, latent, resolution).vertices
-        if not len(vertices):
-            continue
-        near = atlas.frame.to_model(vertices)[rng.integers(0, len(vertices), FOLDING_POINTS)]
-        near += rng.normal(0, 0.01, near.shape)
-        vector = torch.as_tensor(normalised_vector(atlas.covariates, values), dtype=torch.float32)
-        counts.append(folded(network, near.astype(np.float32), vector, torch.as_tensor(latent)).mean())
-    return float(np.mean(counts))
+def mean_displacement_mm(atlas: Atlas, surface_mm: trimesh.Trimesh) -> dict[str, float]:
+    """Length of the population's mean displacement of each covariate at z = 0, averaged over a surface.
 
-
-def _template_volume(atlas: Atlas, resolution: int) -> dict[str, float | None]:
-    """Volume of the template and, for synthetic data, of the true shape at the population centre."""
-    module = _synthetic(atlas)
-    truth = None if module is None else module.true_shape(atlas.population.centre).volume / 1000
-    return {"volume_cm3": atlas.template(resolution).volume / 1000, "truth_cm3": truth}
+    The template stands where the mean shape stands only if nobody's displacement is everybody's.
+    """
+    network, frame = atlas.checkpoint.network(), atlas.frame
+    points = frame.to_model(trimesh.sample.sample_surface(surface_mm, 500, seed=0)[0])
+    vectors = atlas.population.normalised()[~atlas.population.held_out]
+    total = torch.zeros(len(atlas.covariates), len(points), frame.dim)
+    for vector in torch.as_tensor(vectors, dtype=torch.float32):
+        with torch.inference_mode():
+            total += network.displacements(
+                torch.as_tensor(points, dtype=torch.float32)[None],
+                vector[None],
+                torch.zeros(1, network.config.latent),
+            )[:, 0]
+    lengths = (total / len(vectors)).norm(dim=-1).mean(dim=-1) * frame.scale_mm
+    return dict(zip(atlas.population.names, map(float, lengths), strict=True))
 
 
 def _part(progress: Progress | None, start: float, stop: float) -> Progress | None:

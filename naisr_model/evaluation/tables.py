@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -93,6 +94,10 @@ def reconstruction_report(
     folded_share: float,
     growth: Sequence[TruthPoint] = (),
     effects: Sequence[TruthPoint] = (),
+    template: TruthPoint | None = None,
+    corner_components: Sequence[int] = (),
+    mean_displacement_mm: Mapping[str, float] = MappingProxyType({}),
+    without_surface: int = 0,
 ) -> Record:
     """The record that ``naisr evaluate reconstruction --json`` writes.
 
@@ -102,6 +107,10 @@ def reconstruction_report(
         folded_share: share of the points near the surface where p -> p + d(p) folds.
         growth: along the population growth path, where the truth is known.
         effects: of single covariates with the others at their mean, where the truth is known.
+        template: beside the true shape at the population centre, where that is known.
+        corner_components: connected components at the corners of the box of ranges, where no data are.
+        mean_displacement_mm: length of the mean of each covariate's displacement over the population.
+        without_surface: held-out shapes whose fit has no surface at all; they have no distances.
 
     Returns:
         Plain JSON types. ``n`` shapes; ``cd_x100``, ``hd_x100``, ``vd_cm3`` and the other columns, each
@@ -123,7 +132,11 @@ def reconstruction_report(
         "truth_volume_error": _worst((f"{point.value:g}", point) for point in growth),
         "effect_volume_error": _worst((point.covariate, point) for point in effects),
         "folded_share": float(folded_share),
-        "components": [int(min(components)), int(max(components))],
+        "components": _extremes(components),
+        "corner_components": _extremes(corner_components),
+        "without_surface": int(without_surface),
+        "mean_displacement_mm": dict(mean_displacement_mm),
+        "template": None if template is None else _place(template),
         "growth": [_place(point) for point in growth],
         "effects": [_place(point) for point in effects],
         "samples": distances[0].samples,
@@ -148,6 +161,10 @@ def reconstruction_markdown(report: Mapping[str, Any], published: Sequence[Publi
         _definitions(report, bool(published)),
     ]
     return "\n\n".join(filter(None, sections)) + "\n"
+
+
+def _extremes(counts: Sequence[int]) -> list[int]:
+    return [int(min(counts)), int(max(counts))] if counts else []
 
 
 def _summary(values: Sequence[float]) -> Record:
@@ -209,10 +226,24 @@ def _truth_table(title: str, places: Sequence[Mapping[str, Any]]) -> str:
 
 def _checks(report: Mapping[str, Any]) -> str:
     least, most = report["components"]
-    return (
-        f"Connected components: {least} to {most} (1 everywhere means no ghosts). "
-        f"Folded points near the surface: {report['folded_share']:.2%}."
-    )
+    sentences = [
+        f"Connected components: {least} to {most} (1 everywhere means no ghosts).",
+        f"Folded points near the surface: {report['folded_share']:.2%}.",
+    ]
+    if report["without_surface"]:
+        sentences.append(f"Held-out shapes without any surface: {report['without_surface']}.")
+    if report["corner_components"]:
+        least, most = report["corner_components"]
+        sentences.append(f"At the corners of the ranges, where no data are: {least} to {most} components.")
+    if template := report["template"]:
+        sentences.append(
+            f"Template: {template['volume_cm3']:.2f} cm³, true at the centre {template['truth_cm3']:.2f} cm³ "
+            f"({template['volume_error']:+.1%}), HD x10² {template['hd_x100']:.2f}."
+        )
+    if shifts := report["mean_displacement_mm"]:
+        listed = ", ".join(f"{name} {shift:.2f} mm" for name, shift in shifts.items())
+        sentences.append(f"Mean displacement over the population, which centring keeps small: {listed}.")
+    return " ".join(sentences)
 
 
 def _definitions(report: Mapping[str, Any], with_published: bool) -> str:

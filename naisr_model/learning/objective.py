@@ -33,9 +33,9 @@ class Batch(NamedTuple):
         """The four arrays as tensors on ``device``."""
         return cls(*(torch.as_tensor(array, device=device) for array in arrays))
 
-    def narrow(self, start: int, stop: int) -> Batch:
-        """The shapes ``start`` to ``stop``."""
-        return Batch(*(part[start:stop] for part in self))
+    def narrow(self, shapes: slice) -> Batch:
+        """Some of the shapes."""
+        return Batch(*(part[shapes] for part in self))
 
 
 def reconstruction_terms(
@@ -92,10 +92,9 @@ def population_terms(
         displacements = network.displacements(points, covariates, latents)
         terms["ridge"] = weights.ridge * losses.ridge(displacements)
     if weights.centring and binary:
-        columns = list(binary)
-        minus = network.displacements(points, -torch.ones_like(covariates), latents)[columns]
-        plus = network.displacements(points, torch.ones_like(covariates), latents)[columns]
-        terms["centring"] = weights.centring * losses.centring(minus, plus)
+        levels = torch.cat([-torch.ones_like(covariates), torch.ones_like(covariates)])
+        both = network.displacements(points.repeat(2, 1, 1), levels, latents.repeat(2, 1))[list(binary)]
+        terms["centring"] = weights.centring * losses.centring(*both.chunk(2, dim=1))
     return terms
 
 

@@ -6,6 +6,8 @@ with the same weights as one that was not.
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 import time
 from collections.abc import Callable
@@ -27,7 +29,8 @@ from naisr_model.files import replacing
 from naisr_model.learning.objective import Batch, latent_term, population_terms, reconstruction_terms
 from naisr_model.learning.residual import smooth_basis
 from naisr_model.networks.naisr import Naisr
-from naisr_model.surface.fields import folded, template_field
+from naisr_model.surface.fields import template_field
+from naisr_model.surface.folding import folded_shares
 from naisr_model.surface.isosurface import isosurface
 from naisr_model.surface.lattice import Lattice
 from naisr_model.surface.sparse import evaluate_band
@@ -35,13 +38,14 @@ from naisr_model.surface.sparse import evaluate_band
 POINTS_AT_ONCE = 1024
 """Points whose activations are alive together: they stay in the cache, twice as fast on a CPU."""
 
-SAVE_SECONDS = 60.0
 POPULATION_SHAPES = 4
 """Shapes of a batch at whose points the effects are held in place."""
-MEASURED_ITERATIONS = 20
-FOLDING_SHAPES, FOLDING_POINTS = 40, 1000
+
+SAVE_SECONDS = 60.0
+FOLDING_SHAPES = 20
+
 DIVERGED = 20.0
-"""A loss this many times its running mean means that the training has broken down."""
+"""A loss this many times its best running mean means that the training has broken down."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +54,7 @@ class Report:
 
     Attributes:
         iteration: iterations done.
-        iterations: iterations of the whole training.
+        share: how much of the training is done, 0 to 1.
         epoch: passes over the training shapes done.
         losses: the weighted terms of this batch and their ``total``.
         points_per_second: points trained on a second, this run.
@@ -58,41 +62,94 @@ class Report:
     """
 
     iteration: int
-    iterations: int
+    share: float
     epoch: int
     losses: dict[str, float]
     points_per_second: float
     seconds_left: float
 
 
+@dataclass(frozen=True, eq=False)
+class _Task:
+    """What does not change during a training.
+
+    Attributes:
+        store: the samples.
+        preset: networks and settings.
+        out: the checkpoint to write.
+        budget_s: seconds the training may take; infinite when it is bounded by epochs alone.
+        rows: the store's training rows, ``[n]``.
+        covariates: centred, of those rows, ``[n, N]``.
+        basis: orthonormal columns that are taken out of the codes, ``[n, K]``; none when they are free.
+        binary: columns of binary covariates.
+    """
+
+    store: SampleStore
+    preset: Preset
+    out: Path
+    budget_s: float
+    rows: NDArray[np.intp]
+    covariates: Tensor
+    basis: Tensor
+    binary: tuple[int, ...]
+
+    @property
+    def config(self) -> TrainingConfig:
+        return self.preset.training
+
+    @property
+    def folder(self) -> Path:
+        """Where the state, the log and the templates are kept."""
+        return self.out.with_name(self.out.name + ".training")
+
+    @property
+    def epoch_iterations(self) -> int:
+        return math.ceil(len(self.rows) / self.config.batch_shapes)
+
+    @property
+    def iterations(self) -> int:
+        return self.config.epochs * self.epoch_iterations
+
+    @property
+    def fingerprint(self) -> str:
+        """Changes with the settings and with the data, which a resumed training must share."""
+        known = [repr(self.preset), self.store.folders, self.store.population.to_json()]
+        return hashlib.sha256(json.dumps(known).encode()).hexdigest()
+
+
 @dataclass
 class _State:
-    """What changes during a training, and all that a resumed one needs."""
+    """What changes during a training, and all that a resumed one needs.
+
+    ``best`` is the lowest running mean of the loss so far, ``running`` the present one.
+    """
 
     network: Naisr
     codes: nn.Parameter
     optimiser: torch.optim.Adam
-    iteration: int
-    iterations: int
-    seconds: float
+    iteration: int = 0
+    seconds: float = 0.0
+    running: float = math.inf
+    best: float = math.inf
 
     def to_dict(self) -> dict[str, Any]:
-        return {
+        numbers = {name: getattr(self, name) for name in ("iteration", "seconds", "running", "best")}
+        return numbers | {
             "network": self.network.state_dict(),
             "codes": self.codes.detach(),
             "optimiser": self.optimiser.state_dict(),
-            "iteration": self.iteration,
-            "iterations": self.iterations,
-            "seconds": self.seconds,
         }
 
     def load(self, record: dict[str, Any]) -> None:
         self.network.load_state_dict(record["network"])
         self.codes.data.copy_(record["codes"])
         self.optimiser.load_state_dict(record["optimiser"])
-        self.iteration = record["iteration"]
-        self.iterations = record["iterations"]
-        self.seconds = record["seconds"]
+        for name in ("iteration", "seconds", "running", "best"):
+            setattr(self, name, record[name])
+
+    def share(self, task: _Task) -> float:
+        """How much is done, by iterations or by the time budget, whichever is nearer to its end."""
+        return max(self.iteration / task.iterations, self.seconds / task.budget_s)
 
 
 def train(
@@ -100,7 +157,7 @@ def train(
     preset: Preset,
     out: Path,
     *,
-    time_budget_s: float | None = None,
+    time_budget_s: float = math.inf,
     report: Callable[[Report], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
     device: str = "cpu",
@@ -114,76 +171,72 @@ def train(
         store: prepared samples.
         preset: networks and settings.
         out: the checkpoint to write.
-        time_budget_s: bounds the training: the number of iterations is cut to what fits, judged by
-            the first iterations.
+        time_budget_s: ends the training after so many seconds, earlier stops included; the learning
+            rates then follow the clock, so only a training without it gives the same result twice.
         report: called after every iteration.
-        should_stop: polled before every iteration.
+        should_stop: polled once an iteration.
         device: where torch computes.
 
     Returns:
         The checkpoint that was written.
 
     Raises:
-        InputError: when the loss becomes NaN or breaks away; the last good state is kept.
+        InputError: when settings and data do not fit, or when the loss becomes NaN or breaks away; the
+            last good state is kept.
         Cancelled: when ``should_stop()`` turned true; the state reached is kept.
     """
-    config, folder = preset.training, out.with_name(out.name + ".training")
-    rows = np.flatnonzero(~store.population.held_out)
-    normalised = store.population.normalised()[rows]
-    covariates = torch.as_tensor(normalised, dtype=torch.float32, device=device)
-    binary = _binary_columns(store)
-    projection = _projection(config, normalised, binary).to(device)
-    state = _initial_state(preset, len(rows), len(store.population.covariates), device)
-    state.iterations = config.epochs * math.ceil(len(rows) / config.batch_shapes)
-    if _resume(state, folder / "state.pt", preset):
-        state.network.to(device)
-    saved_at, began, first = time.monotonic(), time.monotonic(), state.iteration
-    running = math.nan
-    with _Log(folder / "tensorboard") as log:
-        while state.iteration < state.iterations:
-            if should_stop is not None and should_stop():
-                _save(state, store, preset, out, folder, projection)
-                raise Cancelled
+    task = _task(store, preset, out, time_budget_s, device)
+    state = _initial_state(preset, len(task.rows), len(store.population.covariates), device)
+    _resume(state, task)
+    first, began, saved = state.iteration, time.monotonic(), time.monotonic()
+    with _Log(task.folder / "tensorboard", state.iteration) as log:
+        while state.share(task) < 1:
             started = time.monotonic()
-            chosen = _batch_rows(config, len(rows), state.iteration)
-            draw = store.draw(
-                rows[chosen].tolist(),
-                config.surface_points,
-                config.near_points,
-                config.uniform_points,
-                np.random.default_rng([config.seed, 1, state.iteration]),
-            )
-            batch = Batch.from_arrays(*draw, device=device)
-            losses = _step(state, batch, chosen, covariates, projection, binary, config)
-            if not losses["total"] < DIVERGED * max(running, 1e-3) and not math.isnan(running):
-                raise InputError(_divergence_message(losses["total"], state, config, out))
-            running = losses["total"] if math.isnan(running) else 0.98 * running + 0.02 * losses["total"]
+            losses = _accumulate_gradients(state, task)
+            _judge(losses["total"], state, task)
+            # Only weights whose loss was just found sound are ever written.
+            stopped = should_stop is not None and should_stop()
+            if stopped or started - saved > SAVE_SECONDS:
+                _save(state, task)
+                saved = time.monotonic()
+            if stopped:
+                raise Cancelled
+            state.optimiser.step()
             state.iteration += 1
+            _keep_template(state, task)
             state.seconds += time.monotonic() - started
-            done = state.iteration - first
-            if time_budget_s is not None and done == MEASURED_ITERATIONS and first == 0:
-                state.iterations = min(state.iterations, max(done, int(done * time_budget_s / state.seconds)))
-            told = _report(state, config, len(rows), losses, (time.monotonic() - began) / done)
+            told = _report(state, task, losses, (time.monotonic() - began) / (state.iteration - first))
             log.add(told)
-            _keep_template(state, store, config, folder, told.epoch, len(rows))
             if report is not None:
                 report(told)
-            if time.monotonic() - saved_at > SAVE_SECONDS:
-                _save(state, store, preset, out, folder, projection)
-                saved_at = time.monotonic()
-    measured = {"folded_share": _folded_share(state, store, covariates, projection)}
-    return _save(state, store, preset, out, folder, projection, measured)
+    _save(state, task)
+    return _save(state, task, {"folded_share": _folded_share(state, task)})
 
 
-def _binary_columns(store: SampleStore) -> tuple[int, ...]:
-    return tuple(i for i, c in enumerate(store.population.covariates) if c.kind == "binary")
-
-
-def _projection(config: TrainingConfig, normalised: NDArray[np.float64], binary: tuple[int, ...]) -> Tensor:
-    """Orthonormal columns that are taken out of the codes; none when they are free."""
-    if not config.residual_latents:
-        return torch.zeros(len(normalised), 0)
-    return torch.as_tensor(smooth_basis(normalised, binary), dtype=torch.float32)
+def _task(store: SampleStore, preset: Preset, out: Path, budget_s: float, device: str) -> _Task:
+    if preset.network.dim != store.frame.dim:
+        raise InputError(
+            f"the preset is for {preset.network.dim}D shapes and the store holds {store.frame.dim}D ones; "
+            f"choose another preset"
+        )
+    try:
+        torch.empty(1, device=device)
+    except (RuntimeError, AssertionError) as error:
+        raise InputError(f"torch cannot compute on '{device}' here; choose cpu, cuda or mps") from error
+    rows = np.flatnonzero(~store.population.held_out)
+    normalised = store.population.normalised()[rows]
+    binary = tuple(i for i, c in enumerate(store.population.covariates) if c.kind == "binary")
+    basis = smooth_basis(normalised, binary) if preset.training.residual_latents else normalised[:, :0]
+    return _Task(
+        store=store,
+        preset=preset,
+        out=out,
+        budget_s=budget_s,
+        rows=rows,
+        covariates=torch.as_tensor(normalised, dtype=torch.float32, device=device),
+        basis=torch.as_tensor(basis, dtype=torch.float32, device=device),
+        binary=binary,
+    )
 
 
 def _initial_state(preset: Preset, shapes: int, covariates: int, device: str) -> _State:
@@ -200,51 +253,58 @@ def _initial_state(preset: Preset, shapes: int, covariates: int, device: str) ->
             {"params": [parameter]},
         ]
     )
-    return _State(network, parameter, optimiser, 0, 0, 0.0)
+    return _State(network, parameter, optimiser)
 
 
-def _batch_rows(config: TrainingConfig, shapes: int, iteration: int) -> NDArray[np.intp]:
-    """Training shapes of one batch: every epoch is a fresh permutation."""
-    epoch, index = divmod(iteration, math.ceil(shapes / config.batch_shapes))
-    order = np.random.default_rng([config.seed, 0, epoch]).permutation(shapes)
-    return order[index * config.batch_shapes : (index + 1) * config.batch_shapes]
+def _batch_indices(task: _Task, iteration: int) -> NDArray[np.intp]:
+    """Training shapes of one batch; every epoch is a fresh permutation."""
+    epoch, index = divmod(iteration, task.epoch_iterations)
+    order = np.random.default_rng([task.config.seed, 0, epoch]).permutation(len(task.rows))
+    return order[index * task.config.batch_shapes : (index + 1) * task.config.batch_shapes]
 
 
-def _step(
-    state: _State,
-    batch: Batch,
-    chosen: NDArray[np.intp],
-    covariates: Tensor,
-    projection: Tensor,
-    binary: tuple[int, ...],
-    config: TrainingConfig,
-) -> dict[str, float]:
-    """One optimiser step; returns the weighted terms and their total."""
-    _set_rates(state, config)
+def _draw(task: _Task, chosen: NDArray[np.intp], iteration: int) -> Batch:
+    config = task.config
+    counts = config.surface_points, config.near_points, config.uniform_points
+    rng = np.random.default_rng([config.seed, 1, iteration])
+    arrays = task.store.draw(task.rows[chosen].tolist(), *counts, rng)
+    return Batch.from_arrays(*arrays, device=task.covariates.device)
+
+
+def _accumulate_gradients(state: _State, task: _Task) -> dict[str, float]:
+    """Forward and backward through the batch of this iteration; the weighted terms and their total."""
+    config, chosen = task.config, _batch_indices(task, state.iteration)
+    _set_rates(state, config, state.share(task))
     state.optimiser.zero_grad()
-    residual = residual_latents(state.codes, projection)[chosen]
-    with_code = _with_code(config, len(chosen), state.iteration / state.iterations).to(residual.device)
-    leaf = (residual * with_code).detach().requires_grad_()
+    batch, covariates = _draw(task, chosen, state.iteration), task.covariates[chosen]
+    codes = residual_latents(state.codes, task.basis)[chosen]
+    if state.share(task) < config.population_share:
+        codes = codes * 0
+    # The codes' gradient is gathered over the parts of the batch and sent through the projection once.
+    leaf = codes.detach().requires_grad_()
     sums: dict[str, float] = {}
     shapes_at_once = max(1, POINTS_AT_ONCE // config.shape_points)
     for start in range(0, len(chosen), shapes_at_once):
-        stop = min(start + shapes_at_once, len(chosen))
+        part = slice(start, min(start + shapes_at_once, len(chosen)))
         terms = reconstruction_terms(
-            state.network,
-            batch.narrow(start, stop),
-            covariates[chosen[start:stop]],
-            leaf[start:stop],
-            config.loss,
+            state.network, batch.narrow(part), covariates[part], leaf[part], config.loss
         )
-        _accumulate(terms, (stop - start) / len(chosen), sums)
+        _accumulate(terms, (part.stop - part.start) / len(chosen), sums)
     _accumulate(latent_term(leaf, config.loss), 1.0, sums)
-    few = chosen[:POPULATION_SHAPES]
-    points = batch.space_points[: len(few)]
-    _accumulate(population_terms(state.network, points, covariates[few], binary, config.loss), 1.0, sums)
+    few = slice(0, POPULATION_SHAPES)
+    held = population_terms(state.network, batch.space_points[few], covariates[few], task.binary, config.loss)
+    _accumulate(held, 1.0, sums)
     assert leaf.grad is not None
-    (residual * with_code).backward(leaf.grad)
-    state.optimiser.step()
+    codes.backward(leaf.grad)
     return sums | {"total": sum(sums.values())}
+
+
+def _judge(total: float, state: _State, task: _Task) -> None:
+    """Follow the loss, and stop where it has become NaN or has broken away."""
+    if not math.isfinite(total) or total > DIVERGED * max(state.best, 1e-3):
+        raise InputError(_divergence_message(total, state, task))
+    state.running = total if math.isinf(state.running) else 0.98 * state.running + 0.02 * total
+    state.best = min(state.best, state.running)
 
 
 def residual_latents(codes: Tensor, basis: Tensor) -> Tensor:
@@ -252,21 +312,11 @@ def residual_latents(codes: Tensor, basis: Tensor) -> Tensor:
     return codes - basis @ (basis.T @ codes)
 
 
-def _set_rates(state: _State, config: TrainingConfig) -> None:
-    share = state.iteration / state.iterations
+def _set_rates(state: _State, config: TrainingConfig, share: float) -> None:
     factor = 0.5 * (1 + math.cos(math.pi * share)) if config.cosine else 1.0
     rates = (config.template_rate, config.displacement_rate, config.latent_rate)
     for group, rate in zip(state.optimiser.param_groups, rates, strict=True):
         group["lr"] = rate * factor
-
-
-def _with_code(config: TrainingConfig, shapes: int, share: float) -> Tensor:
-    """1 for the shapes of a batch that use their code, 0 for those trained at z = 0; ``[shapes, 1]``."""
-    with_code = torch.ones(shapes, 1)
-    if share < config.population_share:
-        with_code[:] = 0
-    with_code[: round(config.anchor_share * shapes)] = 0
-    return with_code
 
 
 def _accumulate(terms: dict[str, Tensor], share: float, sums: dict[str, float]) -> None:
@@ -277,113 +327,98 @@ def _accumulate(terms: dict[str, Tensor], share: float, sums: dict[str, float]) 
         sums[name] = sums.get(name, 0.0) + share * float(term.detach())
 
 
-def _report(
-    state: _State, config: TrainingConfig, shapes: int, losses: dict[str, float], seconds_each: float
-) -> Report:
-    points = config.batch_shapes * config.shape_points
-    return Report(
-        iteration=state.iteration,
-        iterations=state.iterations,
-        epoch=state.iteration // math.ceil(shapes / config.batch_shapes),
-        losses=losses,
-        points_per_second=points / seconds_each,
-        seconds_left=(state.iterations - state.iteration) * seconds_each,
-    )
+def _report(state: _State, task: _Task, losses: dict[str, float], seconds_each: float) -> Report:
+    epoch = state.iteration // task.epoch_iterations
+    points = len(task.rows) * task.config.shape_points / task.epoch_iterations
+    left = min((task.iterations - state.iteration) * seconds_each, task.budget_s - state.seconds)
+    return Report(state.iteration, state.share(task), epoch, losses, points / seconds_each, max(0.0, left))
 
 
-def _divergence_message(total: float, state: _State, config: TrainingConfig, out: Path) -> str:
-    kept = f"the last good state is in {out}" if out.exists() else "no good state had been reached"
+def _divergence_message(total: float, state: _State, task: _Task) -> str:
+    config, out = task.config, task.out
+    kept = f"the last good state is in {out}" if out.exists() else "no good state had been saved"
     return (
-        f"the training broke down at iteration {state.iteration} (loss {total:.3g}); {kept}; "
-        f"try again with a template_rate below {config.template_rate:g}, a displacement_rate below "
-        f"{config.displacement_rate:g} or a lower omega0"
+        f"the training broke down at iteration {state.iteration} (loss {total:.3g}); {kept}; try again "
+        f"under another name with a template_rate below {config.template_rate:g}, a displacement_rate "
+        f"below {config.displacement_rate:g} or a lower omega0"
     )
 
 
-def _keep_template(
-    state: _State, store: SampleStore, config: TrainingConfig, folder: Path, epoch: int, shapes: int
-) -> None:
+def _keep_template(state: _State, task: _Task) -> None:
     """Write the template as a mesh when one of the chosen epochs has just ended."""
-    ended = state.iteration % math.ceil(shapes / config.batch_shapes) == 0
-    if not ended or epoch not in config.template_epochs or store.frame.dim != 3:
+    epoch, rest = divmod(state.iteration, task.epoch_iterations)
+    if rest or epoch not in task.config.template_epochs or task.store.frame.dim != 3:
         return
     lattice = Lattice(64)
-    mesh = isosurface(evaluate_band(template_field(state.network), lattice), lattice, store.frame)
+    mesh = isosurface(evaluate_band(template_field(state.network), lattice), lattice, task.store.frame)
     if len(mesh.faces):
-        with replacing(folder / "templates" / f"epoch_{epoch:05d}.ply") as temporary:
+        with replacing(task.folder / "templates" / f"epoch_{epoch:05d}.ply") as temporary:
             mesh.export(temporary)
 
 
-def _folded_share(state: _State, store: SampleStore, covariates: Tensor, projection: Tensor) -> float:
-    """Share of surface points of the training shapes, with their codes, where p + d(p) folds."""
-    rows = np.flatnonzero(~store.population.held_out)
-    latents = residual_latents(state.codes.detach(), projection)
-    rng, shares = np.random.default_rng(0), []
-    count = min(FOLDING_POINTS, int(store.options["surface_samples"]))
-    for index in rng.permutation(len(rows))[:FOLDING_SHAPES]:
-        points = store.draw([int(rows[index])], count, 1, 1, rng).surface_points[0]
-        shares.append(folded(state.network, points, covariates[index], latents[index]).mean())
-    return float(np.mean(shares))
+def _folded_share(state: _State, task: _Task) -> float:
+    """Mean share of folded points near the surfaces of some training shapes, with their codes."""
+    if task.store.frame.dim != 3:
+        return math.nan
+    some = np.random.default_rng(0).permutation(len(task.rows))[:FOLDING_SHAPES]
+    latents = residual_latents(state.codes.detach(), task.basis)[some]
+    return float(np.mean(folded_shares(state.network, task.covariates[some], latents, resolution=64)))
 
 
-def _save(
-    state: _State,
-    store: SampleStore,
-    preset: Preset,
-    out: Path,
-    folder: Path,
-    projection: Tensor,
-    measured: dict[str, float] | None = None,
-) -> Checkpoint:
-    latents = residual_latents(state.codes.detach(), projection)
+def _save(state: _State, task: _Task, measured: dict[str, float] | None = None) -> Checkpoint:
+    store = task.store
     checkpoint = Checkpoint(
         name=store.name,
-        preset=preset,
+        preset=task.preset,
         weights={name: tensor.clone() for name, tensor in state.network.state_dict().items()},
-        latents=latents.numpy(force=True),
+        latents=residual_latents(state.codes.detach(), task.basis).numpy(force=True),
         population=store.population,
         frame=store.frame,
         alignment=store.alignment,
         source=store.source,
         training={
             "iterations": state.iteration,
-            "planned_iterations": state.iterations,
             "seconds": round(state.seconds, 1),
             **(measured or {}),
         },
     )
-    checkpoints.save(out, checkpoint)
-    with replacing(folder / "state.pt") as temporary:
-        torch.save(state.to_dict() | {"preset": repr(preset)}, temporary)
+    checkpoints.save(task.out, checkpoint)
+    with replacing(task.folder / "state.pt") as temporary:
+        torch.save(state.to_dict() | {"fingerprint": task.fingerprint}, temporary)
     return checkpoint
 
 
-def _resume(state: _State, path: Path, preset: Preset) -> bool:
+def _resume(state: _State, task: _Task) -> None:
+    """Go on from the state in the training's folder, if there is one."""
+    path = task.folder / "state.pt"
+    for left_over in task.folder.glob(".state.*.pt"):  # of a program that was killed while it saved
+        left_over.unlink()
     if not path.exists():
-        return False
+        return
     try:
-        record = torch.load(path, weights_only=True)
+        record = torch.load(path, weights_only=True, map_location=task.covariates.device)
+        same = record["fingerprint"] == task.fingerprint
+        if same:
+            state.load(record)
     except Exception as error:
         raise InputError(f"{path} cannot be read ({error}); delete its folder to start again") from error
-    if record["preset"] != repr(preset):
+    if not same:
         raise InputError(
-            f"{path.parent} holds a training with other settings; delete it to start again, "
+            f"{task.folder} holds a training with other settings or data; delete it to start again, "
             f"or give another --out"
         )
-    state.load(record)
-    return True
 
 
 class _Log:
-    """TensorBoard scalars, one point every ten iterations."""
+    """TensorBoard scalars, one point every ten iterations; goes on where a killed one stopped."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    def __init__(self, folder: Path, iteration: int) -> None:
+        self.folder, self.iteration = folder, iteration
 
     def __enter__(self) -> _Log:
         from torch.utils.tensorboard import SummaryWriter
 
-        self.writer = SummaryWriter(str(self.folder))
+        self.writer = SummaryWriter(str(self.folder), purge_step=self.iteration + 1)
         return self
 
     def __exit__(self, *_: object) -> None:

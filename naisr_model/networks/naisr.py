@@ -39,6 +39,11 @@ class Naisr(nn.Module):
             output_scale=0.01,  # the template is found undeformed before it is deformed
         )
 
+    @property
+    def device(self) -> torch.device:
+        """Where the weights are."""
+        return self.template_network.last_bias.device
+
     def template(self, points: Tensor) -> Tensor:
         """T, the template's signed distance, ``[shapes, n]``."""
         distance: Tensor = self.template_network(points)

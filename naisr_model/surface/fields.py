@@ -7,7 +7,6 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from naisr_model.networks.calculus import deformation_determinant, gradient
 from naisr_model.networks.naisr import Naisr
 from naisr_model.surface.sparse import Field
 
@@ -20,7 +19,7 @@ def template_field(network: Naisr) -> Field:
 
     def field(points: NDArray[np.float32]) -> NDArray[np.float32]:
         with torch.inference_mode():
-            return network.template(torch.from_numpy(points)[None])[0].numpy()
+            return network.template(_located(network, points))[0].numpy(force=True)
 
     return field
 
@@ -30,8 +29,8 @@ def shape_field(network: Naisr, covariates: Tensor, latent: Tensor) -> Field:
 
     def field(points: NDArray[np.float32]) -> NDArray[np.float32]:
         with torch.inference_mode():
-            values, _ = network(torch.from_numpy(points)[None], covariates[None], latent[None])
-        return values[0].numpy()
+            values, _ = network(_located(network, points), covariates[None], latent[None])
+        return values[0].numpy(force=True)
 
     return field
 
@@ -41,8 +40,8 @@ def effect_field(network: Naisr, index: int, covariates: Tensor, latent: Tensor)
 
     def field(points: NDArray[np.float32]) -> NDArray[np.float32]:
         with torch.inference_mode():
-            values = network.effect(index, torch.from_numpy(points)[None], covariates[None], latent[None])
-        return values[0].numpy()
+            values = network.effect(index, _located(network, points), covariates[None], latent[None])
+        return values[0].numpy(force=True)
 
     return field
 
@@ -55,16 +54,13 @@ def distances(
     Phi itself is a distance only as far as the training made it one: where the template is shrunk,
     Phi is steeper than a distance.
     """
-    located = torch.from_numpy(points)[None].requires_grad_()
+    located = _located(network, points).requires_grad_()
     values, _ = network(located, covariates[None], latent[None])
-    slope = gradient(values, located).norm(dim=-1).clamp(min=LEAST_SLOPE)
+    (gradient,) = torch.autograd.grad(values.sum(), located)
+    slope = gradient.norm(dim=-1).clamp(min=LEAST_SLOPE)
     return (values / slope)[0].numpy(force=True)
 
 
-def folded(
-    network: Naisr, points: NDArray[np.float32], covariates: Tensor, latent: Tensor
-) -> NDArray[np.bool_]:
-    """Where p -> p + d(p) folds, that is det(I + grad d) <= 0; ``[n]`` for ``points [n, dim]``."""
-    located = torch.from_numpy(points)[None].requires_grad_()
-    _, displacement = network(located, covariates[None], latent[None])
-    return (deformation_determinant(displacement, located)[0] <= 0).numpy(force=True)
+def _located(network: Naisr, points: NDArray[np.float32]) -> Tensor:
+    """``points [n, dim]`` as the only shape of a batch, where the network is."""
+    return torch.from_numpy(points)[None].to(network.device)
