@@ -19,14 +19,25 @@ def replacing(path: Path) -> Iterator[Path]:
     temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}{path.suffix}")
     try:
         yield temporary
+        _flush(temporary)
         # Some writers make private files; a saved file is as readable as any other.
-        temporary.chmod(0o666 & ~_umask())
+        temporary.chmod(0o666 & ~_UMASK)
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
 
 
-def _umask() -> int:
-    mask = os.umask(0)
+def _flush(path: Path) -> None:
+    """Wait until the content is on the disk: a rename may otherwise get there first."""
+    with path.open("rb+") as file:
+        os.fsync(file.fileno())
+
+
+def _read_umask() -> int:
+    """Asking means setting, for the whole process; hence only once, before there are threads."""
+    mask = os.umask(0o077)
     os.umask(mask)
     return mask
+
+
+_UMASK = _read_umask()

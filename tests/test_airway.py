@@ -14,7 +14,7 @@ import trimesh
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from naisr_model.data.populations import POPULATIONS, airway, population
+from naisr_model.data.populations import POPULATIONS, PopulationModule, airway, population
 from naisr_model.data.tables import read_table
 from naisr_model.errors import Cancelled, InputError
 
@@ -346,7 +346,8 @@ def test_bad_input_is_explained() -> None:
 
 
 def test_populations_are_found_by_name() -> None:
-    assert population("airway") is airway
+    module: PopulationModule = airway  # what the type checker must agree with
+    assert population("airway") is module
     assert set(POPULATIONS) == {"airway", "bodies"}
     with pytest.raises(InputError, match="unknown population 'heart'; known are airway, bodies"):
         population("heart")

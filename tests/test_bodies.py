@@ -17,7 +17,7 @@ from naisr_model.errors import Cancelled, InputError
 
 pytest.importorskip("anny")
 
-from naisr_model.data.populations import bodies, population
+from naisr_model.data.populations import PopulationModule, bodies, population
 
 # Median standing heights in cm, girls and boys, rounded: child growth standards (1, 2, 5 years) and
 # reference 2007 (10, 19 years) of the World Health Organization.
@@ -96,7 +96,7 @@ def test_the_cohort_is_plausible_and_repeatable():
 def test_people_of_the_same_values_differ():
     values = {"age": 30.0, "weight": 50.0, "sex": 1.0}
     tall, short = (
-        bodies.visit_shape(bodies.Visit("x", "1", values, bodies.Variation(height=score)))
+        bodies.visit_shape(bodies.Visit("x", "1", values, bodies.Variation(height=score)))[0]
         for score in (1.5, -1.5)
     )
     usual = height_cm(bodies.true_shape(values))
@@ -109,7 +109,8 @@ def test_a_missing_value_is_named():
 
 
 def test_the_population_goes_through_the_pipeline(tmp_path):
-    assert population("bodies") is bodies
+    module: PopulationModule = bodies  # what the type checker must agree with
+    assert population("bodies") is module
     fractions: list[float] = []
     csv = bodies.write_population(tmp_path / "people", seed=0, patients=5, progress=fractions.append)
     assert fractions[-1] == 1.0
@@ -123,7 +124,9 @@ def test_the_population_goes_through_the_pipeline(tmp_path):
     assert table.source == {"population": "bodies", "seed": 0, "patients": 5}
     for row, visit, values in zip(table.rows, bodies.visits(0, 5), table.values, strict=True):
         np.testing.assert_array_equal(values, [visit.values[name] for name in ("age", "weight", "sex")])
-        np.testing.assert_allclose(read_mesh(row.mesh).bounds, bodies.visit_shape(visit).bounds, atol=1e-2)
+        mesh, landmarks = bodies.visit_shape(visit)
+        assert landmarks == bodies.true_landmarks(visit.values) == {}
+        np.testing.assert_allclose(read_mesh(row.mesh).bounds, mesh.bounds, atol=1e-2)
     options = PrepareOptions(surface_samples=200, near_samples=200, uniform_samples=200, workers=1)
     report = prepare(csv, tmp_path / "store", options=options)
     assert len(report.accepted) == 5
@@ -140,4 +143,5 @@ def test_writing_can_be_cancelled(tmp_path):
 def test_the_growth_path_is_where_truth_exists():
     path = bodies.growth_path()
     assert {(name, condition) for name, condition, _ in path} == {("age", "female"), ("age", "male")}
+    assert all(set(values) == {"age", "weight", "sex"} for _, _, values in path)
     assert all(bodies.MIN_AGE_YEARS <= values["age"] <= bodies.MAX_AGE_YEARS for _, _, values in path)

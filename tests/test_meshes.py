@@ -49,6 +49,57 @@ def test_a_damaged_file_is_named(tmp_path, suffix, capfd):
         read_mesh(path)
 
 
+PLY = """ply
+format ascii 1.0
+element vertex 4
+property float x
+property float y
+property float z
+element face 2
+property list uchar int vertex_indices
+end_header
+0 0 0
+1 0 0
+0 1 0
+0 0 1
+3 0 1 2
+{last}"""
+VTK = """# vtk DataFile Version 3.0
+a box
+ASCII
+DATASET {dataset}
+POINTS 4 float
+0 0 0 1 0 0 0 1 0 0 0 1
+{cells} 2 9
+3 0 1 2
+4 0 1 2 {index}
+{types}"""
+
+
+@pytest.mark.parametrize("index", [4, -1, 10**9])
+def test_faces_with_missing_vertices_are_rejected(tmp_path, index):
+    grid = {"dataset": "UNSTRUCTURED_GRID", "cells": "CELLS", "types": "CELL_TYPES 2\n5\n9\n"}
+    polygons = {"dataset": "POLYDATA", "cells": "POLYGONS", "types": ""}
+    (tmp_path / "stray.ply").write_text(PLY.format(last=f"3 0 1 {index}\n"))
+    (tmp_path / "polygons.vtk").write_text(VTK.format(index=index, **polygons))
+    (tmp_path / "grid.vtk").write_text(VTK.format(index=index, **grid))
+    for name in ("stray.ply", "polygons.vtk", "grid.vtk"):
+        with pytest.raises(InputError, match=f"{name} has faces that name missing vertices; export it again"):
+            read_mesh(tmp_path / name)
+
+
+def test_a_file_that_was_cut_off_is_rejected(tmp_path, ellipsoid):
+    ellipsoid.export(tmp_path / "whole.ply")
+    content = (tmp_path / "whole.ply").read_bytes()
+    for share in np.linspace(0.02, 0.99, 30):
+        (tmp_path / "cut.ply").write_bytes(content[: int(share * len(content))])
+        with pytest.raises(InputError, match=r"cut\.ply"):
+            read_mesh(tmp_path / "cut.ply")
+    (tmp_path / "cut.ply").write_text(PLY.format(last=""))
+    with pytest.raises(InputError, match=r"cut\.ply is cut off"):
+        read_mesh(tmp_path / "cut.ply")
+
+
 def test_missing_and_foreign_files_are_named(tmp_path):
     with pytest.raises(InputError, match=r"gone\.stl does not exist"):
         read_mesh(tmp_path / "gone.stl")

@@ -18,6 +18,7 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
+from naisr_model.data import meshes
 from naisr_model.data.prepare import PrepareOptions, prepare
 from naisr_model.data.store import SampleStore
 from naisr_model.errors import Cancelled, InputError
@@ -154,12 +155,24 @@ def test_no_usable_mesh_is_an_error(cohort, tmp_path):
 def test_bad_options_and_a_table_without_meshes_are_explained(cohort, tmp_path):
     with pytest.raises(InputError, match="held-out share"):
         prepare(cohort, tmp_path / "store", options=replace(SMALL, held_out=1.0))
+    with pytest.raises(InputError, match="the seed is -1; give 0 or more"):
+        prepare(cohort, tmp_path / "store", options=replace(SMALL, seed=-1))
     with pytest.raises(InputError, match="at least 1"):
         prepare(cohort, tmp_path / "store", options=replace(SMALL, near_samples=0))
     (tmp_path / "bare.csv").write_text("subject,age\na,1\nb,2\nc,3\n")
     with pytest.raises(InputError, match="no column 'mesh'"):
         prepare(tmp_path / "bare.csv", tmp_path / "store", options=SMALL)
     assert not (tmp_path / "store").exists()
+    (tmp_path / "file").write_text("in the way")
+    for out in (tmp_path / "file", tmp_path / "file" / "store"):
+        with pytest.raises(InputError, match="cannot be made"):
+            prepare(cohort, out, options=SMALL)
+    assert (tmp_path / "file").read_text() == "in the way"
+
+
+def test_nobody_need_be_held_out(cohort, tmp_path):
+    prepare(cohort, tmp_path / "store", options=replace(SMALL, held_out=0))
+    assert not SampleStore.open(tmp_path / "store").population.held_out.any()
 
 
 @pytest.mark.parametrize("method", ["none", "icp"])
@@ -174,39 +187,105 @@ def test_other_alignments_go_through(cohort, tmp_path, method):
         np.testing.assert_allclose(centres[3], trimesh.load_mesh(tmp_path / "3.stl").centroid, atol=1e-3)
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_a_cancelled_run_goes_on_later(cohort, tmp_path, workers):
-    polls = iter(range(10_000))
-    options = replace(SMALL, workers=workers)
-    with pytest.raises(Cancelled):
-        prepare(cohort, tmp_path / "cut", options=options, should_stop=lambda: next(polls) > 24 // workers)
-    assert not (tmp_path / "cut" / "store.json").exists()
-    prepare(cohort, tmp_path / "cut", options=SMALL)
-    prepare(cohort, tmp_path / "whole", options=SMALL)
-    assert contents(tmp_path / "cut") == contents(tmp_path / "whole")
+@pytest.mark.parametrize("kind", ["surface.npy", "near.npy", "mesh.ply"])
+def test_preparing_again_mends_a_damaged_store(cohort, tmp_path, kind):
+    out = tmp_path / "store"
+    prepare(cohort, out, options=SMALL)
+    before = contents(out)
+    first, second, *_ = sorted((out / "shapes").iterdir())
+    (first / kind).unlink()
+    (second / kind).write_bytes((second / kind).read_bytes()[:500])
+    assert len(prepare(cohort, out, options=SMALL).skipped) == 8
+    assert contents(out) == before
 
 
-KILLED = PrepareOptions(surface_samples=5_000, near_samples=20_000, uniform_samples=5_000, workers=2)
-PROGRAM = """
-import sys
-from naisr_model.data.prepare import PrepareOptions, prepare
+def test_a_mesh_that_breaks_the_program_is_reported_and_the_rest_goes_on(cohort, tmp_path, monkeypatch):
+    stray = trimesh.load_mesh(tmp_path / "3.stl")
+    faces = np.vstack([stray.faces, [[0, 1, len(stray.vertices)]]])
+    broken = trimesh.Trimesh(stray.vertices, faces, process=False, validate=False)
+    (tmp_path / "3.ply").write_bytes(trimesh.exchange.ply.export_ply(broken, vertex_normal=False))
+    cohort.write_text(cohort.read_text().replace("3.stl", "3.ply"))
+    repair = meshes.repair_mesh
 
-if __name__ == "__main__":
-    options = PrepareOptions(surface_samples=5_000, near_samples=20_000, uniform_samples=5_000, workers=2)
-    prepare(sys.argv[1], sys.argv[2], options=options)
-"""
+    def breaks_on_large(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+        if np.ptp(mesh.vertices[:, 2]) > 2.5 * AXES_MM[2]:
+            raise IndexError("index 7 is out of bounds")
+        return repair(mesh)
+
+    monkeypatch.setattr(meshes, "repair_mesh", breaks_on_large)
+    report = prepare(cohort, tmp_path / "store", options=SMALL)
+    reasons = {remark.row: remark.reason for remark in report.rejected}
+    assert "3.ply has faces that name missing vertices" in reasons.pop(5)
+    assert reasons
+    assert all("cannot be used (IndexError" in reason for reason in reasons.values())
+    assert len(report.accepted) == 9 - len(reasons)
 
 
-def start(program: Path, cohort: Path, out: Path) -> subprocess.Popen[bytes]:
-    program.write_text(PROGRAM)
-    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])}
-    command = [sys.executable, str(program), str(cohort), str(out)]
-    return subprocess.Popen(command, env=environment, start_new_session=True)
+def test_only_what_this_program_wrote_is_cleared_away(cohort, tmp_path):
+    mine = [f"shapes/{name}/scan.stl" for name in ("raw", "0123456789abcdef", ".git", "f" * 25, "F" * 24)]
+    mine += ["shapes/notes.txt"]
+    stale = [f"shapes/{name}/near.npy" for name in ("0" * 24, "." + "a" * 24 + ".123.tmp")]
+    for name in (*mine, *stale):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("precious")
+    prepare(cohort, tmp_path, options=SMALL)
+    assert all((tmp_path / name).read_text() == "precious" for name in mine)
+    assert not any((tmp_path / name).parent.exists() for name in stale)
 
 
 def finished_shapes(out: Path) -> list[Path]:
     shapes = out / "shapes"
     return [p for p in shapes.iterdir() if not p.name.startswith(".")] if shapes.is_dir() else []
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_cancelled_run_goes_on_later(cohort, tmp_path, workers):
+    cut, heard = tmp_path / "cut", [0.0]
+
+    def two_are_finished() -> bool:
+        writing = heard[-1] > 0.099  # looking and placing take the first tenth
+        deadline = time.monotonic() + 60
+        while writing and workers > 1 and len(finished_shapes(cut)) < 2 and time.monotonic() < deadline:
+            time.sleep(0.005)
+        return len(finished_shapes(cut)) >= 2
+
+    with pytest.raises(Cancelled):
+        prepare(
+            cohort,
+            cut,
+            options=replace(SMALL, workers=workers),
+            progress=heard.append,
+            should_stop=two_are_finished,
+        )
+    assert not (cut / "store.json").exists()
+    done = finished_shapes(cut)
+    assert len(prepare(cohort, cut, options=SMALL).skipped) == len(done) >= 2
+    prepare(cohort, tmp_path / "whole", options=SMALL)
+    assert contents(cut) == contents(tmp_path / "whole")
+
+
+PROGRAM = """
+import contextlib, multiprocessing, os, signal, sys, threading
+from naisr_model.data import prepare
+
+write = prepare._write_samples
+
+
+def write_or_kill(job):
+    finished = [path for path in job.target.parent.iterdir() if not path.name.startswith(".")]
+    if len(finished) < 3:
+        return write(job)
+    with contextlib.suppress(ProcessLookupError):
+        os.kill(multiprocessing.parent_process().pid, signal.SIGKILL)
+    threading.Event().wait()  # a worker that does not see its parent go hangs here
+
+
+if __name__ == "__main__":
+    prepare._write_samples = write_or_kill
+    options = prepare.PrepareOptions(400, 800, 300, workers=2)
+    prepare.prepare(sys.argv[1], sys.argv[2], options=options)
+"""
+"""Kills itself from within a worker once three of its shapes are finished."""
 
 
 def group_is_empty(group: int) -> bool:
@@ -219,22 +298,28 @@ def group_is_empty(group: int) -> bool:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no SIGKILL")
 def test_a_killed_run_goes_on_to_the_same_store(cohort, tmp_path):
-    cut, whole = tmp_path / "cut", tmp_path / "whole"
-    process = start(tmp_path / "program.py", cohort, cut)
-    deadline = time.monotonic() + 60
-    while len(finished_shapes(cut)) < 2 and time.monotonic() < deadline:
-        time.sleep(0.005)
-    process.send_signal(signal.SIGKILL)
-    process.wait()
-    assert not (cut / "store.json").exists()
-    while not group_is_empty(process.pid) and time.monotonic() < deadline:
-        time.sleep(0.02)
-    assert group_is_empty(process.pid), "the workers outlived the killed program"
+    cut, whole, program = tmp_path / "cut", tmp_path / "whole", tmp_path / "program.py"
+    program.write_text(PROGRAM)
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])}
+    command = [sys.executable, str(program), str(cohort), str(cut)]
+    process = subprocess.Popen(command, env=environment, start_new_session=True)
+    try:
+        assert process.wait(timeout=120) == -signal.SIGKILL
+        assert not (cut / "store.json").exists()
+        deadline = time.monotonic() + 60
+        while not group_is_empty(process.pid) and time.monotonic() < deadline:
+            time.sleep(0.02)
+        assert group_is_empty(process.pid), "the workers outlived the killed program"
+    finally:
+        if not group_is_empty(process.pid):
+            os.killpg(process.pid, signal.SIGKILL)
 
     done = finished_shapes(cut)
-    assert 2 <= len(done) < 10
-    shutil.copytree(done[0], done[0].with_name(".half.123.tmp"))  # as a kill while writing leaves it
-    report = prepare(cohort, cut, options=replace(KILLED, workers=1))
+    assert 3 <= len(done) < 10
+    shutil.copytree(
+        done[0], done[0].with_name(f".{done[0].name}.123.tmp")
+    )  # as a kill while writing leaves it
+    report = prepare(cohort, cut, options=SMALL)
     assert len(report.skipped) == len(done)
-    prepare(cohort, whole, options=replace(KILLED, workers=1))
+    prepare(cohort, whole, options=SMALL)
     assert contents(cut) == contents(whole)

@@ -55,7 +55,6 @@ def test_what_was_written_is_read(store):
     assert store.alignment.reference == {"cords": (0.0, 0.0, 0.0)}
     assert store.population.names == ("age",)
     assert store.mesh(2).bounds[1].max() == pytest.approx(3.0)
-    assert store.samples(1).near.shape == (80, 4)
 
 
 def test_a_draw_has_the_asked_shapes_of_the_asked_rows(store):
@@ -113,3 +112,54 @@ def test_what_is_no_store_is_explained(store, tmp_path):
     index.write_text(index.read_text()[:40])
     with pytest.raises(InputError, match="damaged"):
         SampleStore.open(store.path)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda record: {"version": 1},
+        lambda record: record | {"population": []},
+        lambda record: record | {"frame": {"centre_mm": "here"}},
+        lambda record: record | {"source": 3},
+        lambda record: record | {"shapes": record["shapes"][:2]},
+    ],
+)
+def test_a_damaged_index_is_explained(store, change):
+    index = store.path / "store.json"
+    index.write_text(json.dumps(change(json.loads(index.read_text()))))
+    with pytest.raises(InputError, match=r"is damaged .*; run 'naisr prepare' again"):
+        SampleStore.open(store.path)
+
+
+def cut(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:300])
+
+
+def of_doubles(path: Path) -> None:
+    np.save(path, np.load(path).astype(np.float64))
+
+
+def of_one_column(path: Path) -> None:
+    np.save(path, np.load(path)[:, 0])
+
+
+@pytest.mark.parametrize("damage", [Path.unlink, cut, of_doubles, of_one_column])
+def test_damaged_samples_are_explained(store, damage):
+    damage(store.folder(1) / "near.npy")
+    with pytest.raises(InputError, match=r"near\.npy is damaged .*; run 'naisr prepare' again"):
+        store.draw([0, 1, 2], 10, 20, 5, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("damage", [Path.unlink, cut])
+def test_samples_that_are_damaged_during_a_training_are_explained(store, damage):
+    store.draw([1], 10, 80, 5, np.random.default_rng(0))
+    damage(store.folder(1) / "near.npy")
+    with pytest.raises(InputError, match=r"near\.npy is damaged"):
+        store.draw([1], 10, 80, 5, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("damage", [Path.unlink, cut])
+def test_a_damaged_mesh_is_explained(store, damage):
+    damage(store.folder(1) / "mesh.ply")
+    with pytest.raises(InputError, match=r"mesh\.ply is damaged"):
+        store.mesh(1)

@@ -5,8 +5,9 @@ Coordinates are taken as millimetres whatever the format says.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import igl
 import numpy as np
@@ -33,7 +34,7 @@ def read_mesh(path: str | Path) -> trimesh.Trimesh:
 
     Raises:
         InputError: when the file is missing, of another kind, unreadable, without faces, or has a
-            coordinate that is not finite.
+            coordinate that is not finite or a face whose vertices are missing.
     """
     path = Path(path)
     if not path.is_file():
@@ -42,31 +43,64 @@ def read_mesh(path: str | Path) -> trimesh.Trimesh:
     if suffix not in READERS:
         raise InputError(f"{path.name} is not one of {', '.join(sorted(READERS))}; convert it first")
     try:
-        vertices, faces = _read_glb(path) if suffix == ".glb" else _read_polydata(path)
+        vertices, faces = _OTHER_READERS.get(suffix, _read_with_vtk)(path)
+    except InputError:
+        raise
     except Exception as error:  # the readers raise whatever they like on damaged files
         raise InputError(f"{path.name} cannot be read ({error}); export it again") from error
     if not len(faces):
         raise InputError(f"{path.name} has no faces; it is empty, damaged or a point cloud")
     if not np.isfinite(vertices).all():
         raise InputError(f"{path.name} has vertices that are not finite numbers; export it again")
+    _check_indices(path, faces, len(vertices))
     return trimesh.Trimesh(vertices, faces, process=False)
 
 
-def _read_glb(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _check_indices(path: Path, indices: NDArray[np.int64], vertices: int) -> None:
+    if len(indices) and not 0 <= indices.min() <= indices.max() < vertices:
+        raise InputError(f"{path.name} has faces that name missing vertices; export it again")
+
+
+def _read_with_trimesh(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     scene = trimesh.load_scene(path, process=False)
     mesh = scene.to_mesh()
     return np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
 
 
-def _read_polydata(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _read_ply(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """VTK's reader of this format can end the whole process on a file that was cut off."""
+    vertices, faces = _read_with_trimesh(path)
+    with path.open("rb") as file:
+        announced = re.search(rb"^element face (\d+)", file.read(_PLY_HEADER_BYTES), re.MULTILINE)
+    if announced is not None and 0 < len(faces) < int(announced[1]):
+        raise InputError(f"{path.name} is cut off; copy or export it again")
+    return vertices, faces
+
+
+_PLY_HEADER_BYTES = 65536
+_OTHER_READERS = {".glb": _read_with_trimesh, ".ply": _read_ply}
+
+
+def _read_with_vtk(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     import pyvista
 
     with pyvista.vtk_verbosity("off"):
         data = pyvista.read(path)
+    # Checked before the filters, which would read whatever lies beyond the points.
+    _check_indices(path, _point_indices(data), data.n_points)
     if not isinstance(data, pyvista.PolyData):
         data = data.extract_surface()
     data = data.triangulate()
     return np.asarray(data.points, np.float64), np.asarray(data.regular_faces, np.int64)
+
+
+def _point_indices(data: Any) -> NDArray[np.int64]:
+    """Every point that a cell of the data set names; none for a grid, whose cells are implied."""
+    import pyvista
+
+    getters = (getattr(data, f"Get{kind}", None) for kind in ("Verts", "Lines", "Polys", "Strips", "Cells"))
+    arrays = [pyvista.convert_array(get().GetConnectivityArray()) for get in getters if get is not None]
+    return np.concatenate([np.zeros(0, np.int64), *arrays])
 
 
 def repair_mesh(mesh: trimesh.Trimesh) -> trimesh.Trimesh:

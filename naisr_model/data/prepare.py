@@ -11,6 +11,7 @@ import hashlib
 import json
 import multiprocessing
 import os
+import re
 import shutil
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -35,6 +36,7 @@ from naisr_model.frames import Frame, enclosing_frame
 
 Progress = Callable[[float], None]
 REPORT = "report.json"
+_OWN_NAME = re.compile(r"[0-9a-f]{24}|\.[0-9a-f]{24}\.\d+\.tmp")
 
 
 @dataclass(frozen=True)
@@ -140,12 +142,12 @@ def prepare(
         Which rows were used; also written to ``report.json`` in the store.
 
     Raises:
-        InputError: when the table cannot be used or no mesh can.
+        InputError: when the table, the options or ``out`` cannot be used, or no mesh can.
         Cancelled: when ``should_stop()`` turned true.
     """
     options, out = options or PrepareOptions(), Path(out)
     table = _checked_table(csv, options)
-    (out / store.SHAPES).mkdir(parents=True, exist_ok=True)
+    _make_folder(out / store.SHAPES)
     held_out = held_out_mask([row.subject for row in table.rows], options.held_out, options.seed)
     with _runner(options.workers, should_stop) as run:
         looks = [(row, table.alignment.method) for row in table.rows]
@@ -181,12 +183,21 @@ def _checked_table(csv: str | Path, options: PrepareOptions) -> ShapeTable:
         raise InputError(f"the held-out share is {options.held_out:g}; give a number from 0 to below 1")
     if min(options.surface_samples, options.near_samples, options.uniform_samples) < 1:
         raise InputError("the numbers of samples must be at least 1")
+    if options.seed < 0:
+        raise InputError(f"the seed is {options.seed}; give 0 or more")
     if options.workers is not None and options.workers < 1:
         raise InputError(f"the number of workers is {options.workers}; give at least 1")
     table = tables.read_table(csv)
     if any(row.mesh == Path(csv).parent for row in table.rows):
         raise InputError(f"{Path(csv).name} has no column 'mesh'; add one with the path of each mesh")
     return table
+
+
+def _make_folder(path: Path) -> None:
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"the folder {path} cannot be made ({error}); choose another place") from error
 
 
 def _report(
@@ -228,9 +239,11 @@ def _inspect(job: tuple[TableRow, str]) -> _Input:
             if row.landmarks is None:
                 raise InputError("the row has no landmarks file; alignment by landmarks needs one")
             landmarks = align.read_landmarks(row.landmarks)
+        digest = hashlib.sha256(row.mesh.read_bytes()).hexdigest()
     except InputError as error:
         return _Input(reason=str(error))
-    digest = hashlib.sha256(row.mesh.read_bytes()).hexdigest()
+    except Exception as error:  # one damaged mesh never stops the others, whatever is wrong with it
+        return _Input(reason=f"{row.mesh.name} cannot be used ({error!r}); export it again")
     return _Input("", warnings, digest, float(mesh.volume), landmarks)
 
 
@@ -238,8 +251,8 @@ def _place(job: tuple[Alignment, Path, _Input]) -> _Placed:
     alignment, path, item = job
     if item.reason:
         return _Placed(item.reason)
-    mesh, _ = _load(path)
     try:
+        mesh, _ = _load(path)
         transform = align.rigid_transform(alignment, mesh, item.landmarks)
     except InputError as error:
         return _Placed(str(error))
@@ -253,11 +266,13 @@ def _nested(array: NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:
 
 def _write_samples(job: _Job) -> bool:
     """Sample one shape into its folder; false when the folder is already there."""
-    if job.target.is_dir():
+    o = job.options
+    counts = dict(zip(store.KINDS, (o.surface_samples, o.near_samples, o.uniform_samples), strict=True))
+    if store.is_whole(job.target, counts, job.frame.dim):
         return False
+    shutil.rmtree(job.target, ignore_errors=True)
     mesh, _ = _load(job.mesh)
     mesh.apply_transform(np.array(job.transform))
-    o = job.options
     taken = samples.sample_shape(
         mesh, job.frame, o.surface_samples, o.near_samples, o.uniform_samples, job.seed
     )
@@ -266,7 +281,7 @@ def _write_samples(job: _Job) -> bool:
     temporary.mkdir()
     for kind in store.KINDS:
         np.save(temporary / f"{kind}.npy", getattr(taken, kind))
-    mesh.export(temporary / "mesh.ply")
+    mesh.export(temporary / store.MESH)
     try:
         temporary.rename(job.target)
     except OSError:  # another process was faster with the same content
@@ -326,9 +341,12 @@ def _job(
 
 
 def _remove_strangers(folder: Path, known: set[str]) -> None:
-    """Delete samples that the store no longer refers to, and what a killed run left half done."""
+    """Delete samples that the store no longer refers to, and what a killed run left half done.
+
+    Only names that :func:`_job` and :func:`_write_samples` make: the user may keep other things here.
+    """
     for path in folder.iterdir():
-        if path.name not in known:
+        if path.name not in known and _OWN_NAME.fullmatch(path.name):
             shutil.rmtree(path, ignore_errors=True)
 
 

@@ -8,7 +8,7 @@ Layout: ``store.json`` (what the samples are) and, a folder a shape, ``surface.n
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from naisr_model.covariates import Population
 from naisr_model.data.align import Alignment
-from naisr_model.data.samples import ShapeSamples
 from naisr_model.errors import InputError
 from naisr_model.files import replacing
 from naisr_model.frames import Frame
@@ -28,6 +27,7 @@ VERSION = 1
 INDEX = "store.json"
 SHAPES = "shapes"
 KINDS = ("surface", "near", "uniform")
+MESH = "mesh.ply"
 
 
 class Draw(NamedTuple):
@@ -88,21 +88,32 @@ class SampleStore:
         """Open a prepared store; reads the index alone.
 
         Raises:
-            InputError: when ``path`` is not a finished store or a newer program wrote it.
+            InputError: when ``path`` is not a finished store, is damaged, or a newer program wrote it.
         """
         path = Path(path)
         record = _read_index(path / INDEX)
-        return cls(
-            path=path,
-            name=record["name"],
-            population=Population.from_json(record["population"]),
-            frame=Frame.from_json(record["frame"]),
-            alignment=Alignment.from_json(record["alignment"]),
-            source=record["source"],
-            options=record["options"],
-            folders=tuple(record["shapes"]),
-            blocks={},
-        )
+        try:
+            store = cls(
+                path=path,
+                name=str(record["name"]),
+                population=Population.from_json(record["population"]),
+                frame=Frame.from_json(record["frame"]),
+                alignment=Alignment.from_json(record["alignment"]),
+                source=dict(record["source"]),
+                options=dict(record["options"]),
+                folders=tuple(map(str, record["shapes"])),
+                blocks={},
+            )
+        except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
+            raise _damaged(path / INDEX, repr(error)) from error
+        people = store.population
+        rows = {
+            len(store.folders),
+            *map(len, (people.subjects, people.visits, people.values, people.held_out)),
+        }
+        if len(rows) != 1:
+            raise _damaged(path / INDEX, "its columns differ in length")
+        return store
 
     def __len__(self) -> int:
         return len(self.folders)
@@ -112,13 +123,12 @@ class SampleStore:
         return self.path / SHAPES / self.folders[row]
 
     def mesh(self, row: int) -> trimesh.Trimesh:
-        """The repaired and aligned surface of one row, millimetres in the atlas frame."""
-        return trimesh.load_mesh(self.folder(row) / "mesh.ply", process=False)
+        """The repaired and aligned surface of one row, millimetres in the atlas frame.
 
-    def samples(self, row: int) -> ShapeSamples:
-        """All samples of one row, memory-mapped read-only."""
-        surface, near, uniform = (np.load(self.folder(row) / f"{kind}.npy", mmap_mode="r") for kind in KINDS)
-        return ShapeSamples(surface, near, uniform)
+        Raises:
+            InputError: when its file is missing or damaged.
+        """
+        return _read_mesh(self.folder(row) / MESH)
 
     def draw(
         self, rows: Sequence[int], n_surface: int, n_near: int, n_uniform: int, rng: np.random.Generator
@@ -128,7 +138,7 @@ class SampleStore:
         The files are shuffled, so one contiguous block at a random offset is a random subset.
 
         Raises:
-            InputError: when a shape has fewer samples than asked for.
+            InputError: when a shape has fewer samples than asked for, or a file is missing or damaged.
         """
         surface = np.stack([self._block(row, "surface", n_surface, rng) for row in rows])
         near = np.stack([self._block(row, "near", n_near, rng) for row in rows])
@@ -147,15 +157,48 @@ class SampleStore:
             )
         start = int(rng.integers(0, block.rows - count + 1))
         offset = block.offset + start * block.columns * 4
-        flat = np.fromfile(block.path, np.float32, count * block.columns, offset=offset)
-        return flat.reshape(count, block.columns)
+        try:
+            flat = np.fromfile(block.path, np.float32, count * block.columns, offset=offset)
+            return flat.reshape(count, block.columns)
+        except (OSError, ValueError) as error:
+            raise _damaged(block.path, str(error)) from error
 
     def _open_block(self, row: int, kind: str) -> _Block:
-        path = self.folder(row) / f"{kind}.npy"
-        array = np.lib.format.open_memmap(path, mode="r")
-        block = _Block(path, int(array.offset), *map(int, array.shape))
-        self.blocks[row, kind] = block
+        block = self.blocks[row, kind] = _find_block(self.folder(row) / f"{kind}.npy", kind, self.frame.dim)
         return block
+
+
+def _find_block(path: Path, kind: str, dim: int) -> _Block:
+    try:
+        array = np.lib.format.open_memmap(path, mode="r")
+        rows, columns = map(int, array.shape)
+    except (OSError, ValueError) as error:
+        raise _damaged(path, str(error)) from error
+    expected = 2 * dim if kind == "surface" else dim + 1
+    if array.dtype != np.float32 or columns != expected or not array.flags.c_contiguous:
+        raise _damaged(path, f"{array.dtype} in {columns} columns")
+    return _Block(path, int(array.offset), rows, columns)
+
+
+def _read_mesh(path: Path) -> trimesh.Trimesh:
+    try:
+        return trimesh.load_mesh(path, process=False)
+    except Exception as error:  # the reader raises whatever it likes on damaged files
+        raise _damaged(path, str(error)) from error
+
+
+def is_whole(folder: Path, counts: Mapping[str, int], dim: int) -> bool:
+    """Whether a shape's folder holds its mesh and so many samples of each kind in ``dim`` dimensions."""
+    try:
+        blocks = {kind: _find_block(folder / f"{kind}.npy", kind, dim) for kind in counts}
+        _read_mesh(folder / MESH)
+    except InputError:
+        return False
+    return all(blocks[kind].rows == count for kind, count in counts.items())
+
+
+def _damaged(path: Path, what: str) -> InputError:
+    return InputError(f"{path} is damaged ({what}); run 'naisr prepare' again")
 
 
 def _read_index(path: Path) -> dict[str, Any]:
@@ -165,7 +208,7 @@ def _read_index(path: Path) -> dict[str, Any]:
         record = json.loads(path.read_text(encoding="utf-8"))
         version = int(record["version"])
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{path} is damaged ({error}); run 'naisr prepare' again") from error
+        raise _damaged(path, repr(error)) from error
     if version > VERSION:
         raise InputError(f"{path} was written by a newer version of this program; update the program")
     return dict(record)

@@ -35,6 +35,8 @@ from naisr_model.errors import InputError
 from naisr_model.files import replacing
 
 RESERVED = ("mesh", "subject", "visit", "landmarks")
+_TABLES = ("covariates", "alignment", "source")
+_ALIGNMENT_KEYS = ("method", "origin")
 _HEADER = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>[^)]*)\))?\s*$")
 
 
@@ -107,7 +109,7 @@ def read_table(path: str | Path) -> ShapeTable:
         for name in names
     ]
     return ShapeTable(
-        name=str(extra.get("name", path.stem)),
+        name=extra.get("name", path.stem),
         rows=rows,
         covariates=tuple(covariate for covariate, _ in columns),
         values=np.stack([values for _, values in columns], axis=1),
@@ -161,17 +163,39 @@ def _read_toml(path: Path) -> dict[str, Any]:
 
 
 def _known_only(path: Path, extra: Mapping[str, Any], names: Sequence[str]) -> None:
-    tables = {key: extra.get(key, {}) for key in ("covariates", "alignment", "source")}
-    for key, value in tables.items():
-        if not isinstance(value, dict):
-            raise InputError(f"'{key}' in {path.stem}.toml must be a table, such as [{key}]")
-    if unknown := sorted(set(extra) - {"name", *tables}):
-        raise InputError(f"{path.stem}.toml has '{unknown[0]}'; it may have name, {', '.join(tables)}")
-    for name, settings in tables["covariates"].items():
+    toml = f"{path.stem}.toml"
+    if unknown := sorted(set(extra) - {"name", *_TABLES}):
+        raise InputError(f"{toml} has '{unknown[0]}'; it may have name, {', '.join(_TABLES)}")
+    for key in _TABLES:
+        if not isinstance(extra.get(key, {}), dict):
+            raise InputError(f"'{key}' in {toml} must be a table, such as [{key}]")
+    alignment = extra.get("alignment", {})
+    if unknown := sorted(set(alignment) - set(_ALIGNMENT_KEYS)):
+        raise InputError(f"[alignment] in {toml} has '{unknown[0]}'; it may have method and origin")
+    _texts_only(toml, {"name": extra.get("name", "")} | alignment)
+    for name, settings in extra.get("covariates", {}).items():
         if name not in names:
-            raise InputError(f"{path.stem}.toml describes '{name}', which is not a column of {path.name}")
+            raise InputError(f"{toml} describes '{name}', which is not a column of {path.name}")
         if not isinstance(settings, dict) or set(settings) - {"unit", "kind", "levels"}:
-            raise InputError(f"[covariates.{name}] in {path.stem}.toml may have unit, kind and levels only")
+            raise InputError(f"[covariates.{name}] in {toml} may have unit, kind and levels only")
+        _texts_only(toml, {key: value for key, value in settings.items() if key != "levels"})
+        _check_levels(toml, name, settings.get("levels", []))
+    for key, value in extra.get("source", {}).items():
+        if not isinstance(value, str | int | float):  # it is kept as JSON, which has no dates
+            raise InputError(f"'{key}' of [source] in {toml} is {value}; give text or a number")
+
+
+def _texts_only(toml: str, settings: Mapping[str, Any]) -> None:
+    for key, value in settings.items():
+        if not isinstance(value, str):
+            raise InputError(f"'{key}' in {toml} is {value}; put text in quotes")
+
+
+def _check_levels(toml: str, name: str, levels: Any) -> None:
+    if not isinstance(levels, list) or not all(isinstance(level, str | int | float) for level in levels):
+        raise InputError(
+            f'the levels of \'{name}\' in {toml} are {levels!r}; give a list of two, such as ["F", "M"]'
+        )
 
 
 def _rows(path: Path, header: Mapping[str, str], lines: Sequence[Mapping[str, str]]) -> tuple[TableRow, ...]:
@@ -231,7 +255,7 @@ def _column(
 
 
 def _unit(path: Path, name: str, header_unit: str, settings: Mapping[str, Any]) -> str:
-    unit = str(settings.get("unit", header_unit))
+    unit: str = settings.get("unit", header_unit)
     if header_unit and unit != header_unit:
         raise InputError(
             f"'{name}' is in {header_unit} by the header of {path.name} but in {unit} by {path.stem}.toml; "
@@ -246,7 +270,7 @@ def _levels(
     """The names of -1 and +1, or None for a continuous covariate."""
     distinct = sorted(set(cells), key=lambda cell: (_as_number(cell), cell))
     numeric = [cell for cell in distinct if not math.isnan(_as_number(cell))]
-    kind = settings.get("kind", _guess(distinct, numeric))
+    kind = settings.get("kind", "binary" if "levels" in settings else _guess(distinct, numeric))
     if kind == "continuous":
         return None
     if kind != "binary":
@@ -292,7 +316,7 @@ def _alignment(path: Path, settings: Mapping[str, Any], has_landmarks: bool) -> 
         raise InputError(f"alignment method '{method}' in {path.stem}.toml; use {', '.join(METHODS)}")
     if method == "landmarks" and not has_landmarks:
         raise InputError(f"alignment by landmarks needs a column 'landmarks' in {path.name}")
-    return Alignment(method, str(settings.get("origin", "")))
+    return Alignment(method, settings.get("origin", ""))
 
 
 def population_from_table(table: ShapeTable, held_out: NDArray[np.bool_]) -> Population:

@@ -1,15 +1,23 @@
 """Synthetic populations with known effects, by name; each module is imported when it is asked for.
 
-A population module offers ``true_shape(values)``, ``true_landmarks(values)`` and
-``write_population(out, *, seed, patients, progress, should_stop)``.
+A population module offers ``visits(seed, patients)``, ``visit_shape(visit)``, ``true_shape(values)``,
+``true_landmarks(values)``, ``growth_path()`` and
+``write_population(out, *, seed, patients, progress, should_stop)``, see :class:`PopulationModule`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
-from types import MappingProxyType, ModuleType
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Protocol, cast
+
+import trimesh
 
 from naisr_model.errors import InputError
+
+Landmarks = dict[str, tuple[float, float, float]]
 
 POPULATIONS = MappingProxyType(
     {
@@ -20,7 +28,53 @@ POPULATIONS = MappingProxyType(
 """Module of each population; importing this package imports none of them."""
 
 
-def population(name: str) -> ModuleType:
+class PopulationVisit(Protocol):
+    """One person seen once; ``(subject, visit)`` is unique."""
+
+    @property
+    def subject(self) -> str:
+        """The person."""
+
+    @property
+    def visit(self) -> str:
+        """Which of the person's visits."""
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """Covariates in real units by name."""
+
+
+class PopulationModule(Protocol):
+    """What the module of a population offers; shapes and landmarks are in millimetres."""
+
+    def visits(self, seed: int, patients: int = ...) -> Sequence[PopulationVisit]:
+        """Everybody in order; the same seed gives the same people."""
+
+    def visit_shape(self, visit: Any) -> tuple[trimesh.Trimesh, Landmarks]:
+        """The surface and the landmarks of one of :meth:`visits`."""
+
+    def true_shape(self, values: Mapping[str, float]) -> trimesh.Trimesh:
+        """The shape without individual variation."""
+
+    def true_landmarks(self, values: Mapping[str, float]) -> Landmarks:
+        """The landmarks of :meth:`true_shape`; empty where the population needs none."""
+
+    def growth_path(self) -> list[tuple[str, str, dict[str, float]]]:
+        """Where to compare with the truth: the covariate that moves, a condition, all values."""
+
+    def write_population(
+        self,
+        out: Path,
+        *,
+        seed: int,
+        patients: int = ...,
+        progress: Callable[[float], None] | None = None,
+        should_stop: Callable[[], bool] | None = None,
+    ) -> Path:
+        """Write meshes and a table into ``out``; returns the path of the table."""
+
+
+def population(name: str) -> PopulationModule:
     """The module of a population.
 
     Raises:
@@ -28,4 +82,4 @@ def population(name: str) -> ModuleType:
     """
     if name not in POPULATIONS:
         raise InputError(f"unknown population '{name}'; known are {', '.join(sorted(POPULATIONS))}")
-    return import_module(POPULATIONS[name])
+    return cast(PopulationModule, import_module(POPULATIONS[name]))

@@ -190,9 +190,9 @@ def true_landmarks(values: Mapping[str, float]) -> dict[str, tuple[float, float,
     return {}
 
 
-def visit_shape(visit: Visit) -> trimesh.Trimesh:
-    """The surface of one person, millimetres."""
-    return _body(visit.values, visit.variation)
+def visit_shape(visit: Visit) -> tuple[trimesh.Trimesh, dict[str, tuple[float, float, float]]]:
+    """The surface of one person, millimetres, and no landmarks."""
+    return _body(visit.values, visit.variation), {}
 
 
 def _age_at(quantile: float) -> float:
@@ -271,7 +271,7 @@ def write_population(
         if should_stop is not None and should_stop():
             raise Cancelled
         with replacing(out / mesh) as temporary:
-            visit_shape(person).export(temporary, encoding="binary")
+            visit_shape(person)[0].export(temporary, encoding="binary")
         if progress is not None:
             progress(done / len(people))
     source = f'\n[source]\npopulation = "bodies"\nseed = {seed}\npatients = {patients}\n'
