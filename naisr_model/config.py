@@ -105,7 +105,7 @@ class TrainingConfig:
         cosine: let the rates fall to zero along a cosine instead of staying constant.
         population_share: first part of the training, in which every code is 0, so that the
             covariates explain what they can before the codes may.
-        residual_latents: project the codes on the orthogonal complement of a smooth basis in the
+        residual_latents: project the codes on the orthogonal complement of functions of the
             covariates, so that a code cannot carry what a covariate explains.
         template_epochs: epochs at which the template is kept as a mesh.
         seed: of the initial weights and of every draw.
@@ -180,10 +180,10 @@ PRESETS: dict[str, Preset] = {
         NetworkConfig(
             latent=64,
             template=SirenConfig(width=192, hidden=3, omega0=10.0),
-            displacement=SirenConfig(width=128, hidden=2, omega0=5.0),
+            displacement=SirenConfig(width=128, hidden=2, omega0=3.0),
         ),
         TrainingConfig(
-            epochs=440,
+            epochs=300,
             batch_shapes=16,
             surface_points=64,
             near_points=32,

@@ -16,23 +16,33 @@ from numpy.typing import NDArray
 SHAPES_A_FUNCTION = 5
 """A function is added to the basis only while there are this many shapes for each."""
 
+KNOTS = 12
+"""Tent functions of each continuous covariate, at even quantiles. Low powers are not enough: what is
+steeper than they are, such as the growth of infants, then goes into the codes."""
 
-def smooth_basis(covariates: NDArray[np.float64], binary: tuple[int, ...]) -> NDArray[np.float64]:
-    """Orthonormal basis of 1, c_i, c_i c_j, c_i^2, c_i^3 and c_i^4 over the training shapes.
+
+def covariate_basis(covariates: NDArray[np.float64], binary: tuple[int, ...]) -> NDArray[np.float64]:
+    """Orthonormal basis of 1, c_i, tents in every continuous c_i, and products c_i c_j.
 
     Args:
-        covariates: centred, ``[n, N]``.
-        binary: columns whose powers say nothing new.
+        covariates: centred, of the training shapes, ``[n, N]``.
+        binary: columns that only ever are -1 or +1; tents would say nothing new of them.
 
     Returns:
         ``[n, K]`` with orthonormal columns, K at most ``n / SHAPES_A_FUNCTION`` (at least 1).
     """
     count, columns = covariates.shape
     continuous = [i for i in range(columns) if i not in binary]
+    pairs = itertools.combinations(range(columns), 2)
     functions = [np.ones(count), *covariates.T]
-    functions += [covariates[:, i] ** 2 for i in continuous]
-    functions += [covariates[:, i] * covariates[:, j] for i, j in itertools.combinations(range(columns), 2)]
-    functions += [covariates[:, i] ** power for power in (3, 4) for i in continuous]
+    functions += [tent for i in continuous for tent in _tents(covariates[:, i])]
+    functions += [covariates[:, i] * covariates[:, j] for i, j in pairs]
     kept = np.stack(functions[: max(1, count // SHAPES_A_FUNCTION)], axis=1)
     left, singular, _ = np.linalg.svd(kept / np.linalg.norm(kept, axis=0).clip(1e-12), full_matrices=False)
     return left[:, singular > 1e-6 * singular[0]]
+
+
+def _tents(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Piecewise linear functions that are 1 at one of :data:`KNOTS` quantiles and 0 at the others."""
+    knots = np.unique(np.quantile(values, np.linspace(0, 1, KNOTS)))
+    return np.array([np.interp(values, knots, unit) for unit in np.eye(len(knots))])

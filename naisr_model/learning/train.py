@@ -27,7 +27,7 @@ from naisr_model.data.store import SampleStore
 from naisr_model.errors import Cancelled, InputError
 from naisr_model.files import replacing
 from naisr_model.learning.objective import Batch, latent_term, population_terms, reconstruction_terms
-from naisr_model.learning.residual import smooth_basis
+from naisr_model.learning.residual import covariate_basis
 from naisr_model.networks.naisr import Naisr
 from naisr_model.surface.fields import template_field
 from naisr_model.surface.folding import folded_shares
@@ -226,7 +226,7 @@ def _task(store: SampleStore, preset: Preset, out: Path, budget_s: float, device
     rows = np.flatnonzero(~store.population.held_out)
     normalised = store.population.normalised()[rows]
     binary = tuple(i for i, c in enumerate(store.population.covariates) if c.kind == "binary")
-    basis = smooth_basis(normalised, binary) if preset.training.residual_latents else normalised[:, :0]
+    basis = covariate_basis(normalised, binary) if preset.training.residual_latents else normalised[:, :0]
     return _Task(
         store=store,
         preset=preset,
