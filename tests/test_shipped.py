@@ -9,8 +9,9 @@ import torch
 from naisr_model.atlas import Atlas
 from naisr_model.config import FitConfig
 from naisr_model.covariates import normalised_vector
+from naisr_model.data.align import rigid_transform
 from naisr_model.data.populations import airway
-from naisr_model.evaluation.metrics import compare, component_count
+from naisr_model.evaluation.metrics import compare, component_count, hausdorff_x100
 from naisr_model.evaluation.reconstruction import fit_all, held_out_shapes, plausible_values
 from naisr_model.surface.fields import shape_field
 from naisr_model.surface.isosurface import isosurface
@@ -38,8 +39,29 @@ def test_they_load_and_stay_small(name):
 def test_growth_is_the_generator_s_growth(atlas, age, sex):
     values = {"age": age, "weight": airway.median_weight_kg(age, sex), "sex": sex}
     shape = atlas.shape(values, resolution=128)
+    truth = airway.true_shape(values)
+    truth.apply_transform(rigid_transform(atlas.checkpoint.alignment, truth, airway.true_landmarks(values)))
     assert component_count(shape) == 1
-    assert shape.volume == pytest.approx(airway.true_shape(values).volume, rel=0.1)
+    assert shape.volume == pytest.approx(truth.volume, rel=0.1)
+    assert hausdorff_x100(truth, shape, samples=10_000) <= 6
+
+
+@pytest.mark.parametrize("name", ["age", "weight"])
+def test_single_effects_are_the_generator_s(atlas, name):
+    covariate = atlas.covariates[atlas.population.names.index(name)]
+    for value in plausible_values(atlas.population, covariate)[::4]:
+        truth = airway.true_shape(atlas.population.centre | {name: value})
+        assert atlas.effect(name, value, resolution=128).volume == pytest.approx(truth.volume, rel=0.15)
+
+
+def test_sliders_show_one_piece_from_end_to_end(atlas):
+    for covariate in atlas.covariates:
+        for value in np.linspace(*covariate.range, 5):
+            assert component_count(atlas.effect(covariate.name, float(value), resolution=96)) == 1
+
+
+def test_nothing_folds_near_the_surface(atlas):
+    assert atlas.checkpoint.training["folded_share"] < 0.01
 
 
 def test_the_template_stands_where_the_mean_shape_stands(atlas):
