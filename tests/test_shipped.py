@@ -56,7 +56,8 @@ def test_single_effects_are_the_generator_s(atlas, name):
 
 def test_sliders_show_one_piece_from_end_to_end(atlas):
     for covariate in atlas.covariates:
-        for value in np.linspace(*covariate.range, 5):
+        low, high = covariate.range
+        for value in np.linspace(low, high, 5):
             assert component_count(atlas.effect(covariate.name, float(value), resolution=96)) == 1
 
 
