@@ -30,7 +30,7 @@ def atlas() -> Atlas:
 def test_they_load_and_stay_small(name):
     path = RESOURCES / f"{name}.safetensors"
     assert path.stat().st_size < 8e6
-    shape = Atlas.load(path).template(64)
+    shape = Atlas.load(path).template(128)
     assert shape.is_watertight and component_count(shape) == 1
 
 
