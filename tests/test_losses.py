@@ -5,8 +5,9 @@ import pytest
 import torch
 
 from naisr_model.config import LossWeights, NetworkConfig, SirenConfig
+from naisr_model.evaluation.reference import PlainNaisr, plain_loss
 from naisr_model.learning import losses
-from naisr_model.learning.objective import population_terms
+from naisr_model.learning.objective import Batch, latent_term, population_terms, reconstruction_terms
 from naisr_model.learning.residual import covariate_basis
 from naisr_model.learning.train import residual_latents
 from naisr_model.networks.naisr import Naisr
@@ -90,3 +91,57 @@ def test_residual_codes_are_uncorrelated_with_functions_of_the_covariates():
 def test_a_small_population_keeps_codes_to_spare():
     basis = covariate_basis(np.random.default_rng(0).normal(size=(10, 3)), binary=())
     assert basis.shape[1] <= 2
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_loss_and_its_gradients_are_those_of_the_plain_equations(dim):
+    config = NetworkConfig(
+        dim, latent=5, template=SirenConfig(16, 2, omega0=4.0), displacement=SirenConfig(12, 3, omega0=2.0)
+    )
+    torch.manual_seed(0)
+    network = Naisr(config, covariates=2).double()
+    plain = PlainNaisr(network)
+    surface, space = torch.rand(2, 3, 7, dim).double() * 2 - 1
+    normals = torch.nn.functional.normalize(torch.randn(3, 7, dim).double(), dim=-1)
+    batch = Batch(surface, normals, space, torch.rand(3, 7).double() - 0.5)
+    covariates, latents = torch.randn(3, 2).double(), torch.randn(3, 5).double().requires_grad_()
+    weights = LossWeights()
+    terms = reconstruction_terms(network, batch, covariates, latents, weights) | latent_term(latents, weights)
+    loss, truth = (
+        torch.stack(list(terms.values())).sum(),
+        plain_loss(plain, batch, covariates, latents, weights),
+    )
+    torch.testing.assert_close(loss, truth, rtol=1e-12, atol=1e-12)
+    stack = network.displacement_networks
+    ours = torch.autograd.grad(
+        loss, [latents, stack.point_weight, stack.hidden_weight, network.template_network.hidden_weight]
+    )
+    named = dict(plain.named_parameters())
+    first = [named[f"displacements.{index}.first.weight"] for index in range(2)]
+    hidden = [weight for name, weight in named.items() if "displacements" in name and "hidden" in name]
+    hidden = [weight for weight in hidden if weight.dim() == 2]
+    hidden += [named[f"template.hidden.{layer}.weight"] for layer in range(2)]
+    theirs = torch.autograd.grad(truth, [latents, *first, *hidden])
+    torch.testing.assert_close(ours[0], theirs[0], rtol=1e-10, atol=1e-10)
+    for index in range(2):
+        torch.testing.assert_close(ours[1][index], theirs[1 + index][:, :dim], rtol=1e-10, atol=1e-10)
+        for layer in range(3):
+            expected = theirs[3 + 3 * index + layer][:, :12]
+            torch.testing.assert_close(ours[2][layer, index], expected, rtol=1e-10, atol=1e-10)
+    torch.testing.assert_close(ours[3][:, 0], torch.stack(theirs[-2:]), rtol=1e-10, atol=1e-10)
+
+
+def test_single_precision_agrees_with_double():
+    torch.manual_seed(0)
+    network = Naisr(NetworkConfig(latent=4), covariates=2)
+    normals = torch.nn.functional.normalize(torch.randn(2, 20, 3), dim=-1)
+    batch = Batch(torch.rand(2, 20, 3), normals, torch.rand(2, 10, 3), torch.rand(2, 10))
+    covariates, latents, weights = torch.randn(2, 2), torch.zeros(2, 4), LossWeights()
+    gradients = []
+    for kind in (torch.float32, torch.float64):
+        network, batch = network.to(kind), Batch(*(part.to(kind) for part in batch))
+        terms = reconstruction_terms(network, batch, covariates.to(kind), latents.to(kind), weights)
+        inputs = [network.displacement_networks.hidden_weight, network.template_network.hidden_weight]
+        gradients.append(torch.autograd.grad(torch.stack(list(terms.values())).sum(), inputs))
+    for single, double in zip(*gradients, strict=True):
+        assert (single - double).norm() < 1e-3 * double.norm()

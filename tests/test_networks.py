@@ -7,12 +7,8 @@ import pytest
 import torch
 
 from naisr_model.config import PRESETS, NetworkConfig, SirenConfig
-from naisr_model.networks.calculus import (
-    deformation_determinant,
-    gradient,
-    jacobian,
-    pulled_back_gradient,
-)
+from naisr_model.networks.calculus import deformation_determinant, gradient, jacobian, linearised
+from naisr_model.networks.inference import displacement_function, effect_function, shape_function
 from naisr_model.networks.naisr import Naisr
 from naisr_model.networks.siren import sine
 
@@ -49,6 +45,14 @@ def plain_siren(net, index, point, condition):
     return net.last_weight[index] @ state + net.last_bias[index]
 
 
+def assert_exact(got, expected):
+    torch.testing.assert_close(got, expected, rtol=0, atol=1e-12)
+
+
+def plain_template(network, point):
+    return plain_siren(network.template_network, 0, point, torch.zeros(0, dtype=point.dtype))[0]
+
+
 def plain_displacement(network, index, point, value, latent):
     at = [torch.cat([torch.stack([v]), latent]) for v in (value, torch.zeros_like(value))]
     f_value, f_zero = (plain_siren(network.displacement_networks, index, point, c) for c in at)
@@ -56,19 +60,40 @@ def plain_displacement(network, index, point, value, latent):
 
 
 @pytest.mark.parametrize("dim", [2, 3])
-def test_full_shape_and_effects_follow_the_equations_of_the_paper(dim):
+def test_training_and_inference_follow_the_equations_of_the_paper(dim):
     network, (points, covariates, latents) = make(dim), arguments(dim)
     values, displacement = network(points, covariates, latents)
-    effects = [network.effect(i, points, covariates, latents) for i in range(2)]
-    nothing = torch.zeros(0, dtype=torch.float64)
     for s in range(3):
+        fused = displacement_function(network, covariates[s], latents[s])(points[s])
+        full, *effects = (
+            shape_function(network, kept, latents[s])(points[s])
+            for kept in (covariates[s], *torch.diag(covariates[s]))
+        )
         for n in range(7):
             p, z = points[s, n], latents[s]
             g = [plain_displacement(network, i, p, covariates[s, i], z) for i in range(2)]
-            template = [plain_siren(network.template_network, 0, p + d, nothing)[0] for d in (*g, sum(g))]
-            torch.testing.assert_close(displacement[s, n], sum(g))
-            torch.testing.assert_close(values[s, n], template[2])
-            torch.testing.assert_close(torch.stack([e[s, n] for e in effects]), torch.stack(template[:2]))
+            template = [plain_template(network, p + d) for d in (*g, sum(g))]
+            for got in (displacement[s, n], fused[n]):
+                assert_exact(got, sum(g))
+            for got in (values[s, n], full[n]):
+                assert_exact(got, template[2])
+            for got, expected in zip(effects, template, strict=False):
+                assert_exact(got[n], expected)
+
+
+def test_at_inference_a_covariate_at_its_centre_is_left_out(monkeypatch):
+    network, (points, _, latents) = make(covariates=3), arguments(covariates=3)
+    evaluated, product = set(), torch.baddbmm
+
+    def counted(bias, state, weight):
+        evaluated.add(len(state))
+        return product(bias, state, weight)
+
+    monkeypatch.setattr(torch, "baddbmm", counted)
+    displaced = displacement_function(network, torch.tensor([0.0, 0.7, 0.0]), latents[0])(points[0])
+    assert evaluated == {1}
+    assert displaced.abs().max() > 1e-3
+    assert (displacement_function(network, torch.zeros(3), latents[0])(points[0]) == 0).all()
 
 
 def test_a_covariate_at_its_centre_displaces_nothing_whatever_the_code():
@@ -77,13 +102,6 @@ def test_a_covariate_at_its_centre_displaces_nothing_whatever_the_code():
     displacements = network.displacements(points, covariates, latents)
     assert displacements[0].abs().max() > 1e-3
     assert displacements[1].abs().max() < 1e-14
-
-
-def test_inference_gives_what_training_gives():
-    network, args = make(), arguments()
-    with torch.inference_mode():
-        inferred, _ = network(*args)
-    torch.testing.assert_close(inferred, network(*args)[0])
 
 
 @pytest.mark.parametrize(
@@ -126,11 +144,13 @@ def test_gradients_agree_with_finite_differences():
 def test_the_chain_rule_gives_the_same_gradient():
     network, (points, covariates, latents) = make(), arguments()
     points.requires_grad_()
-    displacement = network.displacements(points, covariates, latents).sum(dim=0)
-    deformed = points + displacement
-    values = network.template(deformed)
-    chained = pulled_back_gradient(gradient(values, deformed), displacement, points)
-    torch.testing.assert_close(chained, gradient(values, points))
+    values, displacement = network(points, covariates, latents)
+    local = linearised(network, points.detach(), covariates, latents)
+    torch.testing.assert_close(local.values, values)
+    torch.testing.assert_close(local.displacement, displacement)
+    torch.testing.assert_close(local.slope, gradient(values, points))
+    deformed = (points + displacement).detach().requires_grad_()
+    torch.testing.assert_close(local.template_slope, gradient(network.template(deformed), deformed))
 
 
 def test_determinant_of_a_known_map():
@@ -139,3 +159,14 @@ def test_determinant_of_a_known_map():
     determinant = deformation_determinant(points @ matrix.T, points)
     assert determinant.detach().numpy() == pytest.approx(np.linalg.det(np.eye(3) + matrix.numpy()))
     assert (determinant < 0).all()
+
+
+def test_one_effect_at_several_values_is_that_effect_at_each():
+    network, (points, covariates, latents) = make(), arguments()
+    values = torch.tensor([-1.5, 0.0, 0.4, 2.0], dtype=torch.float64)
+    found = effect_function(network, 1, values, latents[0])(points[0])
+    for value, displacement in zip(values, found, strict=True):
+        alone = torch.zeros_like(covariates[:1])
+        alone[0, 1] = value
+        expected = network.displacements(points[:1], alone, latents[:1])[1, 0]
+        torch.testing.assert_close(displacement, expected, rtol=0, atol=1e-12)

@@ -9,7 +9,7 @@ from torch import Tensor
 
 from naisr_model.config import LossWeights
 from naisr_model.learning import losses
-from naisr_model.networks.calculus import deformation_determinant, gradient, pulled_back_gradient
+from naisr_model.networks.calculus import deformation_determinant, linearised
 from naisr_model.networks.naisr import Naisr
 
 
@@ -46,12 +46,8 @@ def reconstruction_terms(
     On- and off-surface points go through the networks together, so that they are evaluated once.
     """
     on = batch.surface_points.shape[1]
-    points = torch.cat([batch.surface_points, batch.space_points], dim=1).requires_grad_()
-    displacement = network.displacements(points, covariates, latents).sum(dim=0)
-    deformed = points + displacement
-    values = network.template(deformed)
-    template_slope = gradient(values, deformed)
-    slope = pulled_back_gradient(template_slope, displacement, points)
+    points = torch.cat([batch.surface_points, batch.space_points], dim=1)
+    values, slope, template_slope, _ = linearised(network, points, covariates, latents)
     terms = {
         "surface_distance": weights.surface_distance * losses.distance(values[:, :on], 0.0),
         "surface_normal": weights.surface_normal * losses.normal(slope[:, :on], batch.surface_normals),
@@ -69,7 +65,9 @@ def reconstruction_terms(
             values[:, on:], slope[:, on:], batch.space_sdf, weights.first_order_reach
         )
     if weights.folding:
-        determinant = deformation_determinant(displacement, points)[:, :on]
+        located = batch.surface_points.requires_grad_()
+        displacement = network.displacements(located, covariates, latents).sum(dim=0)
+        determinant = deformation_determinant(displacement, located)
         terms["folding"] = weights.folding * losses.folding(determinant)
     return terms
 

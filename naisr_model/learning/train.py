@@ -22,7 +22,7 @@ from torch import Tensor, nn
 
 from naisr_model import checkpoint as checkpoints
 from naisr_model.checkpoint import Checkpoint
-from naisr_model.config import Preset, TrainingConfig
+from naisr_model.config import LossWeights, Preset, TrainingConfig
 from naisr_model.data.store import SampleStore
 from naisr_model.errors import Cancelled, InputError
 from naisr_model.files import replacing
@@ -282,14 +282,7 @@ def _accumulate_gradients(state: _State, task: _Task) -> dict[str, float]:
         codes = codes * 0
     # The codes' gradient is gathered over the parts of the batch and sent through the projection once.
     leaf = codes.detach().requires_grad_()
-    sums: dict[str, float] = {}
-    shapes_at_once = max(1, POINTS_AT_ONCE // config.shape_points)
-    for start in range(0, len(chosen), shapes_at_once):
-        part = slice(start, min(start + shapes_at_once, len(chosen)))
-        terms = reconstruction_terms(
-            state.network, batch.narrow(part), covariates[part], leaf[part], config.loss
-        )
-        _accumulate(terms, (part.stop - part.start) / len(chosen), sums)
+    sums = accumulate_reconstruction(state.network, batch, covariates, leaf, config.loss)
     _accumulate(latent_term(leaf, config.loss), 1.0, sums)
     few = slice(0, POPULATION_SHAPES)
     held = population_terms(state.network, batch.space_points[few], covariates[few], task.binary, config.loss)
@@ -297,6 +290,31 @@ def _accumulate_gradients(state: _State, task: _Task) -> dict[str, float]:
     assert leaf.grad is not None
     codes.backward(leaf.grad)
     return sums | {"total": sum(sums.values())}
+
+
+def accumulate_reconstruction(
+    network: Naisr, batch: Batch, covariates: Tensor, latents: Tensor, weights: LossWeights
+) -> dict[str, float]:
+    """Add the gradients of L_on and L_off to the parameters, a part of the batch at a time.
+
+    Args:
+        network: the networks.
+        batch: samples of some shapes.
+        covariates: of those shapes, centred, ``[shapes, N]``.
+        latents: their codes, ``[shapes, L]``.
+        weights: of the terms.
+
+    Returns:
+        The weighted terms, means over the batch.
+    """
+    shapes, count = batch.surface_points.shape[0], batch.surface_points.shape[1] + batch.space_sdf.shape[1]
+    sums: dict[str, float] = {}
+    shapes_at_once = max(1, POINTS_AT_ONCE // count)
+    for start in range(0, shapes, shapes_at_once):
+        part = slice(start, min(start + shapes_at_once, shapes))
+        terms = reconstruction_terms(network, batch.narrow(part), covariates[part], latents[part], weights)
+        _accumulate(terms, (part.stop - part.start) / shapes, sums)
+    return sums
 
 
 def _judge(total: float, state: _State, task: _Task) -> None:

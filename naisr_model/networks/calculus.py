@@ -1,9 +1,13 @@
-"""Derivatives of fields with respect to the query points, by automatic differentiation."""
+"""Derivatives of fields with respect to the query points."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import torch
 from torch import Tensor
+
+from naisr_model.networks.naisr import Naisr
 
 
 def gradient(values: Tensor, points: Tensor) -> Tensor:
@@ -20,16 +24,44 @@ def gradient(values: Tensor, points: Tensor) -> Tensor:
     return result
 
 
-def pulled_back_gradient(outer: Tensor, displacement: Tensor, points: Tensor) -> Tensor:
-    """Gradient of T(p + d(p)) by the chain rule, (I + grad d)^T grad T, differentiable again.
+class Linearised(NamedTuple):
+    """The full shape's field and what its losses need of its derivatives, model units.
+
+    Attributes:
+        values: Phi, ``[shapes, n]``.
+        slope: grad Phi with respect to the points, ``[shapes, n, dim]``.
+        template_slope: grad T at the deformed points, ``[shapes, n, dim]``.
+        displacement: sum_i g_i, ``[shapes, n, dim]``.
+    """
+
+    values: Tensor
+    slope: Tensor
+    template_slope: Tensor
+    displacement: Tensor
+
+
+def linearised(network: Naisr, points: Tensor, covariates: Tensor, latents: Tensor) -> Linearised:
+    """Phi and grad Phi = (I + grad d)^T grad T at p + d(p), by the chain rule written out.
+
+    A loss of these needs one backward pass, not one through the graph of another.
 
     Args:
-        outer: grad T at p + d(p), ``[..., n, dim]``.
-        displacement: d(p), ``[..., n, dim]``.
-        points: p, ``[..., n, dim]`` with ``requires_grad``.
+        network: the networks.
+        points: ``[shapes, n, dim]``.
+        covariates: ``[shapes, N]``.
+        latents: ``[shapes, L]``.
     """
-    (bent,) = torch.autograd.grad(displacement, points, grad_outputs=outer, create_graph=True)
-    return outer + bent
+    shapes = len(points)
+    conditions = network.conditions(covariates, latents)
+    at_both, bends = network.displacement_networks.traced(points.repeat(2, 1, 1), conditions)
+    at_value, at_zero = at_both.split(shapes, dim=1)
+    displacement = (at_value - at_zero).sum(dim=0)
+    values, slopes = network.template_network.traced(points + displacement)
+    template_slope = network.template_network.pulled_back(torch.ones_like(values), slopes)[0]
+    outer = torch.cat([template_slope, -template_slope]).expand(len(conditions), -1, -1, -1)
+    bent = network.displacement_networks.pulled_back(outer, bends).sum(dim=0)
+    slope = template_slope + bent[:shapes] + bent[shapes:]
+    return Linearised(values[0, :, :, 0], slope, template_slope, displacement)
 
 
 def jacobian(vectors: Tensor, points: Tensor) -> Tensor:

@@ -51,12 +51,21 @@ class Naisr(nn.Module):
 
     def displacements(self, points: Tensor, covariates: Tensor, latents: Tensor) -> Tensor:
         """All g_i, ``[N, shapes, n, dim]``; 0 to rounding where c_i = 0."""
+        both = self.displacement_networks(points.repeat(2, 1, 1), self.conditions(covariates, latents))
+        value, zero = both.chunk(2, dim=1)
+        return value - zero
+
+    @staticmethod
+    def conditions(covariates: Tensor, latents: Tensor) -> Tensor:
+        """What the f_i see beside the points: (c_i, z) of every shape, then (0, z).
+
+        Returns:
+            ``[N, 2 * shapes, 1 + L]``.
+        """
         codes = latents.expand(covariates.shape[1], *latents.shape)
         at_value = torch.cat([covariates.T[..., None], codes], dim=-1)
         at_zero = torch.cat([torch.zeros_like(covariates).T[..., None], codes], dim=-1)
-        both = self.displacement_networks(points.repeat(2, 1, 1), torch.cat([at_value, at_zero], dim=1))
-        value, zero = both.chunk(2, dim=1)
-        return value - zero
+        return torch.cat([at_value, at_zero], dim=1)
 
     def forward(self, points: Tensor, covariates: Tensor, latents: Tensor) -> tuple[Tensor, Tensor]:
         """Phi and the whole displacement.
@@ -66,7 +75,3 @@ class Naisr(nn.Module):
         """
         displacement = self.displacements(points, covariates, latents).sum(dim=0)
         return self.template(points + displacement), displacement
-
-    def effect(self, index: int, points: Tensor, covariates: Tensor, latents: Tensor) -> Tensor:
-        """Phi_i of the covariate with this index, ``[shapes, n]``."""
-        return self.template(points + self.displacements(points, covariates, latents)[index])

@@ -8,51 +8,48 @@ batched product serves all of them; the template is a stack of one. What is cons
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import torch
 from torch import Tensor, nn
 
 from naisr_model.config import SirenConfig
+from naisr_model.networks.products import multiply
 
 
-class _Sine(torch.autograd.Function):
-    """sin, as often differentiable as torch's, with the cosine kept for the backward pass.
+class _SineAndSlope(torch.autograd.Function):
+    """sin and cos of the same angle, each the other's derivative.
 
-    Training differentiates twice (the eikonal term). Plain ``torch.sin`` evaluates four trigonometric
-    functions an element for that, this two; on a CPU they cost as much as the matrix products.
+    They are kept for the backward pass, so that however often one differentiates, only two
+    trigonometric functions an element are evaluated; on a CPU they cost as much as the products.
     """
 
     @staticmethod
-    def forward(ctx: Any, angle: Tensor) -> Tensor:
+    def forward(ctx: Any, angle: Tensor) -> tuple[Tensor, Tensor]:
+        ctx.set_materialize_grads(False)
         sine, cosine = torch.sin(angle), torch.cos(angle)
-        ctx.save_for_backward(angle, sine, cosine)
-        return sine
+        ctx.save_for_backward(sine, cosine)
+        return sine, cosine
 
     @staticmethod
-    def backward(ctx: Any, *gradients: Tensor) -> Any:
-        return _SineBackward.apply(gradients[0], *ctx.saved_tensors)
+    def backward(ctx: Any, *gradients: Tensor | None) -> Any:
+        sine, cosine = ctx.saved_tensors
+        of_sine, of_cosine = gradients
+        result = None if of_sine is None else of_sine * cosine
+        if of_cosine is None:
+            return result
+        return -of_cosine * sine if result is None else torch.addcmul(result, of_cosine, sine, value=-1)
 
 
-class _SineBackward(torch.autograd.Function):
-    """``outer * cos(angle)`` with sine and cosine given."""
-
-    @staticmethod
-    def forward(ctx: Any, outer: Tensor, angle: Tensor, sine: Tensor, cosine: Tensor) -> Tensor:
-        ctx.save_for_backward(outer, angle, sine, cosine)
-        return outer * cosine
-
-    @staticmethod
-    def backward(ctx: Any, *gradients: Tensor) -> Any:
-        outer, angle, sine, cosine = ctx.saved_tensors
-        if torch.is_grad_enabled():  # somebody differentiates on: the kept values would be constants
-            sine, cosine = torch.sin(angle), torch.cos(angle)
-        return gradients[0] * cosine, -(gradients[0] * outer * sine), None, None
+def sine_and_slope(angle: Tensor) -> tuple[Tensor, Tensor]:
+    """sin(angle) and its derivative cos(angle), both differentiable."""
+    return _SineAndSlope.apply(angle)
 
 
 def sine(angle: Tensor) -> Tensor:
     """sin(angle), the activation of every layer; the cheap form where no gradient is wanted."""
-    return _Sine.apply(angle) if torch.is_grad_enabled() else angle.sin_()
+    return sine_and_slope(angle)[0] if torch.is_grad_enabled() else angle.sin_()
 
 
 class SirenStack(nn.Module):
@@ -105,21 +102,61 @@ class SirenStack(nn.Module):
         Returns:
             ``[stack, shapes, n, outputs]``.
         """
+        return self._evaluate(points, conditions, sine)
+
+    def traced(self, points: Tensor, conditions: Tensor | None = None) -> tuple[Tensor, list[Tensor]]:
+        """As :meth:`forward`, with the slopes of every layer that :meth:`pulled_back` needs."""
+        slopes = []
+
+        def activation(angle: Tensor) -> Tensor:
+            value, slope = sine_and_slope(angle)
+            slopes.append(slope)
+            return value
+
+        return self._evaluate(points, conditions, activation), slopes
+
+    def pulled_back(self, cotangent: Tensor, slopes: list[Tensor]) -> Tensor:
+        """The outputs' Jacobian with respect to the points, transposed, times ``cotangent``.
+
+        The chain rule written out layer by layer: its result is differentiable like any other, and one
+        backward pass then serves a loss that contains spatial gradients.
+
+        Args:
+            cotangent: ``[stack, shapes, n, outputs]``.
+            slopes: from :meth:`traced`.
+
+        Returns:
+            ``[stack, shapes, n, dim]``.
+        """
+        stack, shapes, count, _ = cotangent.shape
+        again: Tensor | None = None
+        state = multiply(cotangent.reshape(stack, shapes * count, -1), self.last_weight)
+        for layer, weight in reversed(list(enumerate(self._hidden_weights()))):
+            state = state * slopes[layer + 1]
+            if layer == self.middle and self.skip_point_weight.shape[-1]:
+                again = multiply(state, self.omega0 * self.skip_point_weight)
+            state = multiply(state, weight)
+        result = multiply(state * slopes[0], self.omega0 * self.point_weight)
+        return (result if again is None else result + again).reshape(stack, shapes, count, -1)
+
+    def _evaluate(
+        self, points: Tensor, conditions: Tensor | None, activation: Callable[[Tensor], Tensor]
+    ) -> Tensor:
         points = points.expand(len(self.point_weight), *points.shape[-3:])
         stack, shapes, count, _ = points.shape
-        first = self._affine(
-            points, self.omega0 * self.point_weight, self.omega0 * self._first_bias(conditions)
-        )
-        state = sine(first).reshape(stack, shapes * count, -1)
-        for layer in range(len(self.hidden_weight)):
-            weight = self.omega0 * self.hidden_weight[layer]
-            bias = (self.omega0 * self.hidden_bias[layer])[:, None]
-            linear = torch.baddbmm(bias, state, weight.mT)
+        state = activation(self._affine(points, self.point_weight, self._first_bias(conditions)))
+        biases = (self.omega0 * self.hidden_bias).unbind()
+        for layer, (weight, bias) in enumerate(zip(self._hidden_weights(), biases, strict=True)):
+            linear = multiply(state, weight.mT, bias)
             if layer == self.middle and conditions is not None:
-                linear = linear + self._skip(points, conditions).reshape(linear.shape)
-            state = sine(linear)
-        output = torch.baddbmm(self.last_bias[:, None], state, self.last_weight.mT)
+                linear += self._skip(points, conditions)
+            state = activation(linear)
+        output = multiply(state, self.last_weight.mT, self.last_bias)
         return output.reshape(stack, shapes, count, -1)
+
+    def _hidden_weights(self) -> tuple[Tensor, ...]:
+        """One ``[stack, width, width]`` a layer, the frequency of the sines included."""
+        return (self.omega0 * self.hidden_weight).unbind()
 
     def _first_bias(self, conditions: Tensor | None) -> Tensor:
         bias = self.first_bias[:, None]
@@ -129,13 +166,14 @@ class SirenStack(nn.Module):
 
     def _skip(self, points: Tensor, conditions: Tensor) -> Tensor:
         skipped = conditions[..., : self.skip_condition_weight.shape[-1]]
-        bias = skipped @ self.skip_condition_weight.mT
-        return self._affine(points, self.omega0 * self.skip_point_weight, self.omega0 * bias)
+        return self._affine(points, self.skip_point_weight, skipped @ self.skip_condition_weight.mT)
 
-    @staticmethod
-    def _affine(points: Tensor, weight: Tensor, bias: Tensor) -> Tensor:
-        """``weight @ point + bias`` with one bias a shape: ``[stack, shapes, n, width]``."""
-        return torch.einsum("kspd,kwd->kspw", points, weight) + bias[:, :, None]
+    def _affine(self, points: Tensor, weight: Tensor, bias: Tensor) -> Tensor:
+        """``omega0 (weight @ point + bias)`` with one bias a shape: ``[stack, shapes * n, width]``."""
+        stack, shapes, count, dim = points.shape
+        linear = multiply(points.reshape(stack, shapes * count, dim), self.omega0 * weight.mT)
+        linear.view(stack, shapes, count, -1).add_(self.omega0 * bias[:, :, None])
+        return linear
 
 
 def _uniform(bound: float, *shape: int) -> nn.Parameter:

@@ -7,6 +7,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from naisr_model.networks.inference import PointFunction, shape_function
 from naisr_model.networks.naisr import Naisr
 from naisr_model.surface.sparse import Field
 
@@ -16,34 +17,19 @@ LEAST_SLOPE = 0.3
 
 def template_field(network: Naisr) -> Field:
     """T in model units."""
-
-    def field(points: NDArray[np.float32]) -> NDArray[np.float32]:
-        with torch.inference_mode():
-            return network.template(_located(network, points))[0].numpy(force=True)
-
-    return field
+    return _field(network, lambda points: network.template(points[None])[0])
 
 
 def shape_field(network: Naisr, covariates: Tensor, latent: Tensor) -> Field:
     """Phi at ``covariates [N]`` (centred) and ``latent [L]``, in model units."""
-
-    def field(points: NDArray[np.float32]) -> NDArray[np.float32]:
-        with torch.inference_mode():
-            values, _ = network(_located(network, points), covariates[None], latent[None])
-        return values[0].numpy(force=True)
-
-    return field
+    return _field(network, shape_function(network, covariates, latent))
 
 
 def effect_field(network: Naisr, index: int, covariates: Tensor, latent: Tensor) -> Field:
-    """Phi_i of the covariate ``index``, in model units."""
-
-    def field(points: NDArray[np.float32]) -> NDArray[np.float32]:
-        with torch.inference_mode():
-            values = network.effect(index, _located(network, points), covariates[None], latent[None])
-        return values[0].numpy(force=True)
-
-    return field
+    """Phi_i of the covariate ``index``, in model units: Phi with the other covariates at 0."""
+    alone = torch.zeros_like(covariates)
+    alone[index] = covariates[index]
+    return shape_field(network, alone, latent)
 
 
 def distances(
@@ -59,6 +45,14 @@ def distances(
     (gradient,) = torch.autograd.grad(values.sum(), located)
     slope = gradient.norm(dim=-1).clamp(min=LEAST_SLOPE)
     return (values / slope)[0].numpy(force=True)
+
+
+def _field(network: Naisr, function: PointFunction) -> Field:
+    def field(points: NDArray[np.float32]) -> NDArray[np.float32]:
+        with torch.inference_mode():
+            return function(torch.from_numpy(points).to(network.device)).numpy(force=True)
+
+    return field
 
 
 def _located(network: Naisr, points: NDArray[np.float32]) -> Tensor:

@@ -1,15 +1,20 @@
 """A field evaluated only near its zero level set.
 
-An octree walks from blocks of :data:`COARSEST` cells down to single cells. A block can hold a piece
-of the surface only where the field at its centre is at most the field's steepest slope times half
-the block's diagonal; all other blocks are done, with the sign of their centre. The steepest slope is
-measured on the field itself.
+Blocks of cells are halved, level by level, down to single cells. Between the corners of a block the
+field is taken for their multilinear interpolation, give or take a bound. A half that this keeps from
+changing sign is done; the nodes of the others are evaluated. The bound is measured on the field:
+:data:`KINK` times its second differences about the block, plus a slack. Every value that the walk
+meets is held against it, and where one breaks it the slack is raised and the walk repeated: what is
+known stays known, and only the halves that are now in question are evaluated. At last the surface is
+followed, cell by cell, wherever it leaves the evaluated cells.
 """
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,14 +25,26 @@ from naisr_model.surface.lattice import Lattice
 Field = Callable[[NDArray[np.float32]], NDArray[np.float32]]
 """Signed distances in model units, ``[n]``, at points in model units, ``[n, dim]``."""
 
+Cells = NDArray[np.intp]
+"""Lowest nodes (x, y[, z]) of blocks or cells, ``[n, dim]``."""
+
 COARSEST = 8
-"""Cells along a side of the largest blocks."""
+"""Resolutions are multiples of this, so that blocks can be halved."""
 
-LEAST_BOUND, SAFETY = 2.0, 1.5
-"""Blocks are tested with the steepest slope between neighbouring coarse centres times ``SAFETY``, at least
-``LEAST_BOUND``. A distance has slope 1, but a template shrunk to a third has slope 3."""
+LEAST_BLOCKS = 16
+"""Blocks along a side of the box on the coarsest level, at least."""
 
-CHUNK = 16_384
+KINK, SAFETY = 0.5, 1.5
+"""A kink halfway between two samples is missed by half of their second difference (a parabola by an
+eighth): that share of it, times ``SAFETY``, bounds the error of interpolation."""
+
+LEAST_SLACK = 1e-6
+"""Model units; the field's own rounding."""
+
+MARKED_AT_ONCE = 1_000_000
+"""Nodes; bounds the memory that marking the inside takes."""
+
+CHUNK = 4096
 """Points evaluated between two looks at ``should_stop``."""
 
 
@@ -48,7 +65,9 @@ def evaluate_band(
     progress: Callable[[float], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
 ) -> NDArray[np.float32]:
-    """The field near its zero level set and its sign elsewhere, shape ``lattice.shape``.
+    """The field at the nodes of all cells that hold its zero level set, and its sign elsewhere.
+
+    A node that was not evaluated has the value infinity, minus infinity inside.
 
     Args:
         field: the signed distance.
@@ -56,55 +75,217 @@ def evaluate_band(
         progress: told the finished share.
         should_stop: polled between chunks.
 
+    Returns:
+        Shape ``lattice.shape``.
+
     Raises:
         Cancelled: when ``should_stop()`` turned true.
     """
-    size = COARSEST
-    blocks = Lattice(lattice.resolution // size - 1, lattice.dim).nodes() * size
-    values = np.empty(lattice.shape, np.float32)
-    done, slope = 0.0, LEAST_BOUND
-    while size > 1:
-        centres = lattice.points(blocks + size / 2)
-        centre_values = _chunked(field, centres, None, should_stop)
-        if size == COARSEST:
-            slope = max(LEAST_BOUND, SAFETY * _steepest(centre_values, lattice))
-        near = np.abs(centre_values) <= slope * lattice.spacing * size / 2 * np.sqrt(lattice.dim)
-        for offset in _corners(lattice.dim, size + 1):
-            values[_array_index(blocks[~near] + offset)] = centre_values[~near]
-        size //= 2
-        blocks = np.concatenate(
-            [blocks[near] + np.multiply(offset, size) for offset in _corners(lattice.dim, 2)]
+    band = _Band(field, lattice, _Meter(progress), should_stop)
+    slack = LEAST_SLACK
+    walked = _walk(band, slack)
+    while walked.excess > 0:
+        slack += SAFETY * max(walked.excess, slack)
+        walked = _walk(band, slack)
+    _follow(band, walked.cells)
+    for size, blocks in walked.inside:
+        band.sink(blocks, size)
+    band.meter.tell(1.0)
+    return band.values
+
+
+class _Meter:
+    """Passes on a share that never falls, though a repeated walk starts again."""
+
+    def __init__(self, progress: Callable[[float], None] | None) -> None:
+        self.progress, self.share = progress, 0.0
+
+    def tell(self, share: float) -> None:
+        self.share = max(self.share, share)
+        if self.progress is not None:
+            self.progress(self.share)
+
+
+@dataclass(frozen=True, eq=False)
+class _Band:
+    """The values known so far, infinity where the field has not been evaluated."""
+
+    field: Field
+    lattice: Lattice
+    meter: _Meter
+    should_stop: Callable[[], bool] | None
+
+    @cached_property
+    def values(self) -> NDArray[np.float32]:
+        """Shape ``lattice.shape``."""
+        return np.full(self.lattice.shape, np.inf, np.float32)
+
+    @cached_property
+    def flat(self) -> NDArray[np.float32]:
+        """The same values in a row."""
+        return self.values.reshape(-1)
+
+    @cached_property
+    def strides(self) -> NDArray[np.intp]:
+        """From a node to the next along x, y[, z] in that row."""
+        return (self.lattice.resolution + 1) ** np.arange(self.lattice.dim)
+
+    def at(self, cells: Cells, offsets: NDArray[np.intp]) -> NDArray[np.float32]:
+        """Values at every cell's node plus ``offsets [k, dim]``, ``[n, k]``."""
+        result: NDArray[np.float32] = self.flat[self.places(cells, offsets)]
+        return result
+
+    def places(self, cells: Cells, offsets: NDArray[np.intp]) -> NDArray[np.intp]:
+        places: NDArray[np.intp] = (cells @ self.strides)[:, None] + offsets @ self.strides
+        return places
+
+    def nodes(self, places: NDArray[np.intp]) -> Cells:
+        """Nodes (x, y[, z]) at these places in the row."""
+        return np.stack(np.unravel_index(places, self.lattice.shape)[::-1], axis=-1)
+
+    def open(self, cells: Cells, size: int) -> None:
+        """Evaluate the corners of these cells of ``size`` that are not known."""
+        places = self.places(cells, size * _offsets(self.lattice.dim, 2)).reshape(-1)
+        places = _distinct(places[np.isinf(self.flat[places])])
+        # Every level has about four times the points of the one before it.
+        before, all_of_it = self.meter.share, 1 / size**2
+        self.flat[places] = _chunked(
+            self.field,
+            self.lattice.points(self.nodes(places)),
+            lambda share: self.meter.tell(before + (all_of_it - before) * share),
+            self.should_stop,
         )
-        done += 0.1
-        if progress is not None:
-            progress(done)
-    nodes = _corner_nodes(blocks, lattice)
-    rest = None if progress is None else lambda share: progress(done + (1 - done) * share)
-    values[_array_index(nodes)] = _chunked(field, lattice.points(nodes), rest, should_stop)
-    return values
+
+    def sink(self, blocks: Cells, size: int) -> None:
+        """Mark what is not known of these blocks of ``size`` as inside."""
+        offsets = _offsets(self.lattice.dim, size + 1)
+        for some in np.array_split(blocks, 1 + len(blocks) * len(offsets) // MARKED_AT_ONCE):
+            places = self.places(some, offsets).reshape(-1)
+            self.flat[places[np.isinf(self.flat[places])]] = -np.inf
 
 
-def _steepest(centre_values: NDArray[np.float32], lattice: Lattice) -> float:
-    """Largest slope along an axis between the centres of neighbouring coarsest blocks."""
-    blocks = centre_values.reshape((lattice.resolution // COARSEST,) * lattice.dim)
-    steps = [np.abs(np.diff(blocks, axis=axis)).max() for axis in range(lattice.dim)]
-    return float(max(steps)) / (COARSEST * lattice.spacing)
+@dataclass(frozen=True, eq=False)
+class _Walk:
+    """Where a walk came to.
+
+    Attributes:
+        cells: all their corners are known.
+        inside: sizes of blocks that were left out because the field is negative there, and the blocks.
+        excess: by how much a value exceeded its bound; 0 where none did.
+    """
+
+    cells: Cells
+    inside: list[tuple[int, Cells]]
+    excess: float
 
 
-def _corners(dim: int, count: int) -> list[tuple[int, ...]]:
-    return list(itertools.product(range(count), repeat=dim))
+def _walk(band: _Band, slack: float) -> _Walk:
+    """Halve blocks down to cells, leaving out what cannot hold the surface under this slack."""
+    dim, size = band.lattice.dim, _coarsest_size(band.lattice)
+    cells = Lattice(band.lattice.resolution // size - 1, dim).nodes() * size
+    bends = np.zeros(len(cells), np.float32)
+    band.open(cells, size)
+    inside, excess = [], 0.0
+    while size > 1:
+        # A parabola's second differences fall to a quarter from level to level.
+        bends = np.maximum(bends / 4, _bends(band, cells, size))
+        bounds = (SAFETY * KINK * bends + slack)[:, None]
+        expected = band.at(cells, size * _offsets(dim, 2)) @ _halving(dim).T
+        size //= 2
+        corners = expected[:, _halves(dim)]
+        lowest, highest = corners.min(axis=2), corners.max(axis=2)
+        kept = (lowest <= bounds) & (highest >= -bounds)
+        halves = cells[:, None] + size * _offsets(dim, 2)
+        inside.append((size, halves[highest < -bounds]))
+        band.open(halves[kept], size)
+        misses = np.abs(band.at(cells, size * _offsets(dim, 3)) - expected) - bounds
+        excess = max(excess, float(misses.max(initial=0.0, where=np.isfinite(misses))))
+        cells, bends = halves[kept], bends[np.nonzero(kept)[0]]
+    return _Walk(cells, inside, excess)
 
 
-def _corner_nodes(cells: NDArray[np.intp], lattice: Lattice) -> NDArray[np.intp]:
-    """The distinct nodes of these cells, in lattice order."""
-    marked = np.zeros(lattice.shape, bool)
-    for offset in _corners(lattice.dim, 2):
-        marked[_array_index(cells + offset)] = True
-    return np.ascontiguousarray(np.argwhere(marked)[:, ::-1])
+def _coarsest_size(lattice: Lattice) -> int:
+    """Cells along a side of the largest blocks: a power of two that divides the resolution."""
+    size = 1
+    while lattice.resolution % (2 * size) == 0 and lattice.resolution // (2 * size) >= LEAST_BLOCKS:
+        size *= 2
+    return size
 
 
-def _array_index(indices: NDArray[np.intp]) -> tuple[NDArray[np.intp], ...]:
-    return tuple(indices.T[::-1])
+def _bends(band: _Band, cells: Cells, size: int) -> NDArray[np.float32]:
+    """The largest second difference along each axis at the corners of the blocks, summed over the axes."""
+    dim, last = band.lattice.dim, band.lattice.resolution
+    total = np.zeros(len(cells), np.float32)
+    for axis in range(dim):
+        corners = _offsets(dim, 2)
+        corners = corners[corners[:, axis] == 0]
+        before, low, high, after = (
+            np.take(
+                band.flat,
+                band.places(cells, size * (corners + step * np.eye(dim, dtype=int)[axis])),
+                mode="clip",
+            )
+            for step in (-1, 0, 1, 2)
+        )
+        before[cells[:, axis] == 0] = np.inf
+        after[cells[:, axis] + 2 * size > last] = np.inf
+        with np.errstate(invalid="ignore"):
+            second = np.abs(np.concatenate([before - 2 * low + high, low - 2 * high + after], axis=1))
+        total += second.max(axis=1, initial=0.0, where=np.isfinite(second))
+    return total
+
+
+def _follow(band: _Band, cells: Cells) -> None:
+    """Open the neighbours of cells through whose faces the surface leaves what was evaluated.
+
+    Values are held against the bounds of blocks on their own level only, so one on the side of a larger
+    block that was left out may still disagree with it.
+    """
+    known = np.sort(cells @ band.strides)
+    while len(cells):
+        beyond = _distinct(_neighbours(band, cells) @ band.strides)
+        beyond = beyond[~np.isin(beyond, known, assume_unique=True)]
+        known = np.concatenate([known, beyond])
+        cells = band.nodes(beyond)
+        band.open(cells, 1)
+
+
+def _neighbours(band: _Band, cells: Cells) -> Cells:
+    """The cells beyond every face on which the values change sign."""
+    dim = band.lattice.dim
+    found = []
+    for axis, side in itertools.product(range(dim), (0, 1)):
+        corners = _offsets(dim, 2)
+        values = band.at(cells, corners[corners[:, axis] == side])
+        crossed = (values.min(axis=1) < 0) & (values.max(axis=1) >= 0)
+        beyond = cells[crossed]
+        beyond[:, axis] += 2 * side - 1
+        found.append(beyond[(beyond[:, axis] >= 0) & (beyond[:, axis] < band.lattice.resolution)])
+    return np.concatenate(found)
+
+
+def _distinct(places: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Sorted, each once; several times faster than ``np.unique``, which hashes."""
+    places = np.sort(places)
+    return places[np.diff(places, prepend=-1) > 0]
+
+
+def _offsets(dim: int, count: int) -> NDArray[np.intp]:
+    """``count^dim`` nodes of a block, ``[count^dim, dim]``."""
+    return np.array(list(itertools.product(range(count), repeat=dim)))
+
+
+def _halving(dim: int) -> NDArray[np.float32]:
+    """Weights of a block's ``2^dim`` corners at its ``3^dim`` nodes of the next level, ``[3^dim, 2^dim]``."""
+    far = _offsets(dim, 3)[:, None] / 2
+    weights: NDArray[np.float64] = np.where(_offsets(dim, 2), far, 1 - far).prod(axis=-1)
+    return weights.astype(np.float32)
+
+
+def _halves(dim: int) -> NDArray[np.intp]:
+    """Which of a block's ``3^dim`` nodes are the corners of each half, ``[2^dim, 2^dim]``."""
+    corners = _offsets(dim, 2)
+    return (corners[:, None] + corners) @ (3 ** np.arange(dim)[::-1])
 
 
 def _chunked(
