@@ -13,6 +13,7 @@ from naisr_model.data.align import (
     Alignment,
     icp_alignment,
     landmark_alignment,
+    propose,
     read_landmarks,
     rigid_transform,
 )
@@ -128,3 +129,79 @@ def test_icp_undoes_a_rigid_motion():
 def test_an_alignment_survives_json():
     alignment = landmark_alignment([named(POINTS)], "cords")
     assert Alignment.from_json(json.loads(json.dumps(alignment.to_json()))) == alignment
+
+
+def branched() -> trimesh.Trimesh:
+    """The knobbly body with a bend, so that neither end looks like the other."""
+    mesh = knobbly()
+    mesh.vertices[:, 1] += 0.01 * (mesh.vertices[:, 2] - 10) ** 2
+    return mesh
+
+
+def part(mesh: trimesh.Trimesh, which: str) -> trimesh.Trimesh:
+    """Without the lowest or the highest third, or with a hole of a fifth of the faces."""
+    height, middle = mesh.triangles_center[:, 2], mesh.triangles_center - mesh.triangles_center[0]
+    kept = {
+        "whole": height > -np.inf,
+        "no bottom": height > mesh.bounds[0, 2] + np.ptp(mesh.bounds[:, 2]) / 3,
+        "no top": height < mesh.bounds[1, 2] - np.ptp(mesh.bounds[:, 2]) / 3,
+        "hole": np.linalg.norm(middle, axis=1) > np.quantile(np.linalg.norm(middle, axis=1), 0.2),
+    }
+    cut = trimesh.Trimesh(mesh.vertices, mesh.faces[kept[which]], process=False)
+    cut.remove_unreferenced_vertices()
+    return cut
+
+
+@pytest.mark.parametrize(
+    ("which", "degrees"), [("whole", 170.0), ("no bottom", 15.0), ("no top", 15.0), ("hole", 15.0)]
+)
+def test_icp_finds_whole_and_partial_shapes(which, degrees):
+    body = branched()
+    motion = np.eye(4)
+    motion[:3, :3] = Rotation.from_rotvec(np.radians(degrees) * np.array([0.6, 0.0, 0.8])).as_matrix()
+    motion[:3, 3] = [70.0, -30.0, 110.0]
+    scan = part(body, which)
+    scan.apply_transform(motion)
+    before = scan.vertices.copy()
+    proposal = propose("icp", scan, body)
+    np.testing.assert_array_equal(scan.vertices, before)
+    assert is_rigid(proposal.transform)
+    back = apply(proposal.transform @ motion, body.vertices)
+    assert np.linalg.norm(back - body.vertices, axis=1).max() < 1.0
+    assert proposal.after_mm < 0.2 < 20 < proposal.before_mm
+
+
+SHIFT_MM = np.array([-5.0, 8.0, -12.0])
+
+
+def test_a_cloud_is_aligned_too():
+    body = branched()
+    cloud = trimesh.Trimesh(body.vertices - SHIFT_MM, np.zeros((0, 3), int), process=False)
+    proposal = propose("icp", cloud, body)
+    np.testing.assert_allclose(proposal.transform[:3, 3], SHIFT_MM, atol=0.5)
+
+
+def test_none_proposes_no_motion_and_says_the_distance():
+    outer, inner = trimesh.creation.icosphere(4, radius=30.0), trimesh.creation.icosphere(4, radius=27.0)
+    proposal = propose("none", inner, outer)
+    np.testing.assert_array_equal(proposal.transform, np.eye(4))
+    assert proposal.before_mm == proposal.after_mm == pytest.approx(3.0, abs=0.05)
+    assert proposal.landmarks_mm is None
+
+
+def test_landmarks_are_proposed_with_their_residual():
+    rng = np.random.default_rng(5)
+    alignment = landmark_alignment([named(POINTS)], "cords")
+    turn = Rotation.from_rotvec([0.3, -0.2, 0.9])
+    off = POINTS + np.array([[0, 0, 0], [0, 0, 3], [0, 0, 0], [0, 0, 0], [0, 0, 0]])
+    body = knobbly()
+    scan = trimesh.Trimesh(turn.apply(body.vertices) + 50.0, body.faces, process=False)
+    exact = propose("landmarks", scan, body, alignment, named(turn.apply(POINTS) + 50.0))
+    assert exact.landmarks_mm == pytest.approx(0.0, abs=1e-4)
+    assert exact.after_mm == pytest.approx(0.0, abs=1e-3)
+    loose = propose("landmarks", scan, body, alignment, named(turn.apply(off) + 50.0))
+    assert loose.landmarks_mm is not None and 0.1 < loose.landmarks_mm < 3 / np.sqrt(5) + 0.1
+    with pytest.raises(InputError, match="not aligned by landmarks; choose icp or none"):
+        propose("landmarks", scan, body, Alignment(), named(rng.random((5, 3))))
+    with pytest.raises(InputError, match="'cords'"):
+        propose("landmarks", scan, body, alignment)

@@ -36,6 +36,18 @@ def read_mesh(path: str | Path) -> trimesh.Trimesh:
         InputError: when the file is missing, of another kind, unreadable, without faces, or has a
             coordinate that is not finite or a face whose vertices are missing.
     """
+    mesh = read_mesh_or_points(path)
+    if not len(mesh.faces):
+        raise InputError(f"{Path(path).name} has no faces; it is empty, damaged or a point cloud")
+    return mesh
+
+
+def read_mesh_or_points(path: str | Path) -> trimesh.Trimesh:
+    """As :func:`read_mesh`, but a file of points alone gives a mesh without faces.
+
+    Raises:
+        InputError: as :func:`read_mesh`, and when there are no points either.
+    """
     path = Path(path)
     if not path.is_file():
         raise InputError(f"{path} does not exist; correct the path")
@@ -48,8 +60,8 @@ def read_mesh(path: str | Path) -> trimesh.Trimesh:
         raise
     except Exception as error:  # the readers raise whatever they like on damaged files
         raise InputError(f"{path.name} cannot be read ({error}); export it again") from error
-    if not len(faces):
-        raise InputError(f"{path.name} has no faces; it is empty, damaged or a point cloud")
+    if not len(vertices):
+        raise InputError(f"{path.name} has no faces and no points; it is empty or damaged, export it again")
     if not np.isfinite(vertices).all():
         raise InputError(f"{path.name} has vertices that are not finite numbers; export it again")
     _check_indices(path, faces, len(vertices))
@@ -63,6 +75,9 @@ def _check_indices(path: Path, indices: NDArray[np.int64], vertices: int) -> Non
 
 def _read_with_trimesh(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     scene = trimesh.load_scene(path, process=False)
+    clouds = [part for part in scene.dump() if isinstance(part, trimesh.PointCloud)]
+    if clouds and len(clouds) == len(scene.geometry):
+        return np.concatenate([np.asarray(cloud.vertices, np.float64) for cloud in clouds]), _NO_FACES
     mesh = scene.to_mesh()
     return np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
 
@@ -78,6 +93,7 @@ def _read_ply(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
 
 
 _PLY_HEADER_BYTES = 65536
+_NO_FACES = np.zeros((0, 3), np.int64)
 _OTHER_READERS = {".glb": _read_with_trimesh, ".ply": _read_ply}
 
 
@@ -86,6 +102,8 @@ def _read_with_vtk(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
 
     with pyvista.vtk_verbosity("off"):
         data = pyvista.read(path)
+    if isinstance(data, pyvista.Grid):
+        raise InputError(f"{path.name} holds a grid of voxels; give a surface, or labels as NIfTI or NRRD")
     # Checked before the filters, which would read whatever lies beyond the points.
     _check_indices(path, _point_indices(data), data.n_points)
     if not isinstance(data, pyvista.PolyData):
@@ -104,20 +122,29 @@ def _point_indices(data: Any) -> NDArray[np.int64]:
 
 
 def repair_mesh(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
-    """Merge duplicated vertices, drop degenerate and repeated faces, and turn the faces outward.
+    """Clean a mesh as :func:`cleaned` does and turn its faces outward as :func:`faced_outward` does."""
+    return faced_outward(cleaned(mesh))
 
-    Winding that differs between neighbours is made consistent first. A component that is inside
-    out is turned round unless it lies within the others, where it is a cavity.
-    """
+
+def cleaned(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+    """Merge duplicated vertices, drop degenerate and repeated faces, and wind neighbours alike."""
     mesh = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
     mesh.update_faces(mesh.nondegenerate_faces(height=0.0) & mesh.unique_faces())
     mesh.remove_unreferenced_vertices()
     if not len(mesh.faces):
         return mesh
+    if mesh.is_winding_consistent:
+        return mesh
+    faces, _ = igl.bfs_orient(np.asarray(mesh.faces, np.int64))
+    return trimesh.Trimesh(mesh.vertices, faces, process=False)
+
+
+def faced_outward(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+    """Turn round each component that is inside out, unless it lies within the others as a cavity."""
+    if not len(mesh.faces):
+        return mesh
     vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
-    if not mesh.is_winding_consistent:
-        faces, _ = igl.bfs_orient(faces)
     return trimesh.Trimesh(vertices, _face_outward(vertices, faces), process=False)
 
 

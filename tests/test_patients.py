@@ -1,0 +1,290 @@
+"""Patients from every kind of file, and what is found wrong with them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import pyvista
+import trimesh
+
+from naisr_model.data.patients import (
+    MOST_FACES,
+    Patient,
+    check_patient,
+    decimated,
+    flipped,
+    hole_areas_mm2,
+    largest_component,
+    read_patient,
+    read_points,
+    repaired,
+    scaled,
+)
+from naisr_model.errors import InputError
+from naisr_model.frames import Frame
+
+FRAME = Frame((0.0, 0.0, 0.0), 115.0)
+"""A population whose largest shape is 200 mm long."""
+
+
+def body() -> trimesh.Trimesh:
+    """An ellipsoid of 120 mm in the middle of the frame."""
+    mesh = trimesh.creation.icosphere(4, radius=60.0)
+    mesh.apply_scale([1.0, 0.6, 0.4])
+    mesh.apply_translation([3.0, -4.0, 5.0])
+    return mesh
+
+
+def cloud(points) -> trimesh.Trimesh:
+    return trimesh.Trimesh(points, np.zeros((0, 3), int), process=False)
+
+
+def topics(patient: Patient) -> list[str]:
+    return [finding.topic for finding in check_patient(patient, FRAME)]
+
+
+# --- reading ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("suffix", [".stl", ".ply", ".obj", ".vtk", ".vtp", ".glb"])
+def test_a_sound_mesh_has_no_findings(tmp_path, suffix):
+    path = tmp_path / f"scan{suffix}"
+    body().export(path) if suffix == ".glb" else pyvista.wrap(body()).save(path)
+    patient = read_patient(path)
+    assert patient.is_closed and not patient.is_cloud
+    assert patient.source == f"scan{suffix}, 5,120 faces"
+    assert patient.mesh_mm.volume == pytest.approx(body().volume, rel=1e-4)
+    assert check_patient(patient, FRAME) == ()
+
+
+def test_points_are_read_from_meshes_without_faces(tmp_path):
+    points = np.asarray(body().vertices)
+    trimesh.PointCloud(points).export(tmp_path / "cloud.ply")
+    pyvista.PolyData(points).save(tmp_path / "cloud.vtp")
+    lines = "\n".join("v {:.6f} {:.6f} {:.6f}".format(*point) for point in points)
+    (tmp_path / "cloud.obj").write_text(lines + "\n")
+    for name in ("cloud.ply", "cloud.vtp", "cloud.obj"):
+        patient = read_patient(tmp_path / name)
+        assert patient.is_cloud and not patient.is_closed
+        np.testing.assert_allclose(patient.mesh_mm.vertices, points, atol=1e-4)
+        assert check_patient(patient, FRAME) == ()
+
+
+TEXTS = {
+    "plain.xyz": "1 2 3\n4 5 6\n",
+    "tabs.txt": "# made by hand\n1\t2\t3\t0.5\n\n4\t5\t6\t0.5\n",
+    "head.csv": "id,X,Y,Z\na,1,2,3\nb,4,5,6\n",
+    "turned.csv": "z;x;y\n3;1;2\n6;4;5\n",
+    "spaced.csv": "\ufeffx, y, z\n1, 2, 3\n4, 5, 6\n",
+}
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_text_gives_points(tmp_path, name):
+    (tmp_path / name).write_text(TEXTS[name], encoding="utf-8")
+    np.testing.assert_array_equal(read_points(tmp_path / name), [[1, 2, 3], [4, 5, 6]])
+
+
+BAD_TEXTS = {
+    "empty.xyz": ("# nothing\n", "is empty"),
+    "words.txt": ("this is no cloud\nof points\n", "no columns x, y and z"),
+    "names.csv": ("a,b,c\n1,2,3\n", "no columns x, y and z"),
+    "short.xyz": ("1 2 3\n4 5\n", "a line without three numbers"),
+    "letters.xyz": ("1 2 3\n4 5 six\n", "a line without three numbers"),
+    "nan.xyz": ("1 2 3\n4 5 nan\n", "not finite"),
+    "head.csv": ("x,y,z\n", "no points"),
+}
+
+
+@pytest.mark.filterwarnings("ignore:loadtxt")
+@pytest.mark.parametrize("name", BAD_TEXTS)
+def test_text_that_is_no_points_is_explained(tmp_path, name):
+    content, match = BAD_TEXTS[name]
+    (tmp_path / name).write_text(content)
+    with pytest.raises(InputError, match=match) as error:
+        read_patient(tmp_path / name)
+    assert name in str(error.value)
+
+
+def test_other_files_are_explained(tmp_path):
+    (tmp_path / "picture.xyz").write_bytes(bytes(range(256)))
+    with pytest.raises(InputError, match=r"picture\.xyz cannot be read"):
+        read_patient(tmp_path / "picture.xyz")
+    with pytest.raises(InputError, match=r"gone\.xyz cannot be read"):
+        read_patient(tmp_path / "gone.xyz")
+    (tmp_path / "scan.dcm").write_bytes(b"")
+    with pytest.raises(InputError, match=r"scan\.dcm is not one of .*\.nrrd.*\.xyz"):
+        read_patient(tmp_path / "scan.dcm")
+    body().export(tmp_path / "scan.ply")
+    with pytest.raises(InputError, match="label 2 cannot be chosen"):
+        read_patient(tmp_path / "scan.ply", label=2)
+    pyvista.ImageData(dimensions=(4, 4, 4)).save(tmp_path / "grid.vtk")
+    with pytest.raises(InputError, match=r"grid\.vtk holds a grid of voxels"):
+        read_patient(tmp_path / "grid.vtk")
+
+
+def labelled(tmp_path, name="scan.nii.gz"):
+    """Two balls of 12 and 6 mm in voxels of half a millimetre, the small one cut by the image's edge."""
+    import SimpleITK as sitk  # noqa: N813
+
+    index = np.stack(np.meshgrid(*[np.arange(80)] * 3, indexing="ij"), axis=-1) / 2
+    voxels = np.where(np.linalg.norm(index - 20, axis=-1) < 12, 1, 0)
+    voxels[np.linalg.norm(index - [37, 37, 37], axis=-1) < 6] = 4
+    image = sitk.GetImageFromArray(voxels.transpose(2, 1, 0).astype(np.uint8))
+    image.SetSpacing((0.5, 0.5, 0.5))
+    image.SetOrigin((100.0, -50.0, 20.0))
+    sitk.WriteImage(image, str(tmp_path / name))
+    return tmp_path / name
+
+
+@pytest.mark.parametrize("name", ["scan.nii.gz", "scan.nii", "scan.nrrd"])
+def test_a_label_is_chosen(tmp_path, name):
+    path = labelled(tmp_path, name)
+    with pytest.raises(InputError, match=r"2 labels \(1: 7\.\d+ cm3, 4: 0\.\d+ cm3\); choose one"):
+        read_patient(path)
+    with pytest.raises(InputError, match="no label 9; it has 1: "):
+        read_patient(path, label=9)
+    patient = read_patient(path, label=1)
+    assert (patient.source, patient.space, patient.remarks) == (f"{name}, label 1", "LPS", ())
+    assert patient.is_closed
+    assert patient.mesh_mm.volume == pytest.approx(4 / 3 * np.pi * 12**3, rel=0.005)
+    np.testing.assert_allclose(patient.mesh_mm.center_mass, [120, -30, 40], atol=0.02)
+    (remark,) = read_patient(path, label=4).remarks
+    assert "edge of the image" in remark
+
+
+def test_a_volume_without_labels_is_rejected(tmp_path):
+    import SimpleITK as sitk  # noqa: N813
+
+    sitk.WriteImage(sitk.Image([9, 9, 9], sitk.sitkUInt8), str(tmp_path / "none.nrrd"))
+    with pytest.raises(InputError, match=r"none\.nrrd has no label; every voxel is 0"):
+        read_patient(tmp_path / "none.nrrd")
+
+
+# --- checks -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("unit", "mm"), [("metres", 1000.0), ("centimetres", 10.0), ("inches", 25.4)])
+def test_units_are_guessed_and_set_right(unit, mm):
+    size = 0.55 if unit == "inches" else 1.0  # at full size inches could as well be small centimetres
+    patient = scaled(Patient(body()), size / mm)
+    (finding,) = check_patient(patient, FRAME)
+    assert (finding.kind, finding.topic) == ("error", "units")
+    assert f"look like {unit}" in finding.sentence
+    right, done, left = repaired(patient, FRAME)
+    np.testing.assert_allclose(right.mesh_mm.bounds, size * body().bounds, rtol=1e-9)
+    assert done == (finding,) and left == ()
+
+
+def test_a_size_that_no_unit_explains_is_left_to_a_person():
+    (finding,) = check_patient(scaled(Patient(body()), 7.0), FRAME)
+    assert finding.topic == "units" and finding.repair is None
+    assert "840 mm long" in finding.sentence and "200 mm" in finding.sentence
+
+
+def test_voxel_indices_are_suspected():
+    grid = np.zeros((60, 60, 60), np.float32)
+    grid[10:50, 15:45, 20:40] = 1
+    surface = pyvista.wrap(grid).contour([0.5], method="flying_edges")
+    (finding,) = check_patient(Patient(trimesh.Trimesh(surface.points, surface.regular_faces)), FRAME)
+    assert finding.topic == "voxels"
+    assert "voxel size" in finding.remedy
+
+
+def test_unusable_shapes_are_errors():
+    broken = body()
+    broken.vertices[3] = np.nan
+    flat = np.random.default_rng(0).uniform(-50, 50, (200, 3)) * [1, 1, 0]
+    sheet = trimesh.creation.icosphere(3, radius=50.0)
+    sheet.update_faces(sheet.triangles_center[:, 2] > 0)
+    doubled = trimesh.Trimesh(sheet.vertices, np.vstack([sheet.faces, sheet.faces[:, ::-1]]), process=False)
+    cases = {"empty": cloud(np.zeros((0, 3))), "numbers": broken, "flat": cloud(flat)}
+    for topic, mesh in {**cases, "few": cloud(body().vertices[:9])}.items():
+        (finding,) = check_patient(Patient(mesh), FRAME)
+        assert (finding.kind, finding.topic) == ("error", "empty" if topic == "few" else topic)
+    assert topics(Patient(doubled)) == ["flat"]
+
+
+def test_a_shape_far_away_must_be_aligned():
+    away = body()
+    away.apply_translation([0, 0, 900.0])
+    (finding,) = check_patient(Patient(away), FRAME)
+    assert (finding.kind, finding.topic) == ("error", "far")
+    assert "905 mm" in finding.sentence and "icp" in finding.remedy
+    away.apply_translation([0, 0, -795.0])
+    (finding,) = check_patient(Patient(away), FRAME)
+    assert (finding.kind, finding.topic) == ("warning", "outside")
+
+
+def test_faces_that_look_inward_are_turned():
+    inside_out = body()
+    inside_out.invert()
+    patient, (finding,), left = repaired(Patient(inside_out), FRAME)
+    assert finding.topic == "inverted" and "100% of the faces" in finding.sentence and left == ()
+    assert patient.mesh_mm.volume == pytest.approx(body().volume)
+
+
+def test_an_open_surface_that_looks_inward_is_turned():
+    part = body()
+    part.update_faces(part.triangles_center[:, 0] < 20.0)
+    part.remove_unreferenced_vertices()
+    outward = Patient(trimesh.Trimesh(part.vertices, part.faces, process=False))
+    assert topics(outward) == ["open"]
+    part.invert()
+    assert topics(Patient(part)) == ["inverted", "open"]
+    np.testing.assert_array_equal(flipped(Patient(part)).mesh_mm.face_normals, outward.mesh_mm.face_normals)
+
+
+def test_components_are_counted_and_the_largest_kept():
+    crumb = trimesh.creation.icosphere(2, radius=3.0)
+    crumb.apply_translation([70.0, 0.0, 0.0])
+    patient = Patient(body() + crumb)
+    (finding,) = check_patient(patient, FRAME)
+    share = body().area / (body().area + crumb.area)
+    assert (finding.kind, finding.topic) == ("warning", "components")
+    assert "2 components" in finding.sentence and f"{share:.1%}" in finding.sentence
+    assert repaired(patient, FRAME)[0] is patient
+    kept = largest_component(patient)
+    assert kept.mesh_mm.volume == pytest.approx(body().volume)
+    assert check_patient(kept, FRAME) == ()
+
+
+def test_holes_are_measured():
+    tube = trimesh.creation.cylinder(radius=10.0, height=100.0, sections=64)
+    side = np.abs(tube.face_normals[:, 2]) < 0.5
+    tube.update_faces(side)
+    tube.remove_unreferenced_vertices()
+    cap_mm2 = 32 * 10.0**2 * np.sin(2 * np.pi / 64)
+    np.testing.assert_allclose(hole_areas_mm2(tube), [cap_mm2, cap_mm2], rtol=1e-6)
+    tube = tube.subdivide_to_size(20.0)
+    (finding,) = check_patient(Patient(tube), FRAME)
+    assert (finding.kind, finding.topic) == ("warning", "open")
+    assert f"2 holes of {2 * cap_mm2 / (2 * cap_mm2 + tube.area):.1%}" in finding.sentence
+    assert not len(hole_areas_mm2(body()))
+
+
+def test_stated_ras_is_told(tmp_path):
+    body().export(tmp_path / "scan.stl")
+    content = bytearray((tmp_path / "scan.stl").read_bytes())
+    content[:29] = b"3D Slicer output. SPACE=RAS  "
+    (tmp_path / "scan.stl").write_bytes(content)
+    patient = read_patient(tmp_path / "scan.stl")
+    (finding,) = check_patient(patient, FRAME)
+    assert (finding.kind, finding.topic) == ("warning", "space")
+    assert finding.repair is not None
+    turned = finding.repair(patient)
+    np.testing.assert_allclose(turned.mesh_mm.center_mass, [-3, 4, 5], atol=1e-3)
+    assert check_patient(turned, FRAME) == ()
+
+
+def test_a_very_fine_surface_is_decimated():
+    fine = trimesh.creation.torus(50.0, 20.0, major_sections=900, minor_sections=300)
+    assert len(fine.faces) > MOST_FACES
+    patient, (finding,), left = repaired(Patient(fine), FRAME)
+    assert finding.topic == "fine" and left == ()
+    assert len(patient.mesh_mm.faces) < MOST_FACES
+    assert patient.is_closed
+    assert patient.mesh_mm.volume == pytest.approx(fine.volume, rel=1e-3)
+    coarse = np.asarray(decimated(Patient(fine), 20_000).mesh_mm.vertices)
+    ring = np.linalg.norm(coarse[:, :2], axis=1) - 50
+    np.testing.assert_allclose(np.hypot(ring, coarse[:, 2]), 20.0, atol=0.1)
