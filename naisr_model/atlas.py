@@ -7,7 +7,10 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -20,13 +23,37 @@ from naisr_model.checkpoint import Checkpoint, load
 from naisr_model.covariates import Covariate, Population, Values, complete, normalised_vector
 from naisr_model.errors import InputError
 from naisr_model.frames import Frame
+from naisr_model.learning.fit import ShapeFit, draw_sample, fit_shape
+from naisr_model.learning.posterior import (
+    POINTS,
+    TWO_SIDED_95,
+    Posterior,
+    moved,
+    posterior_of,
+    surface_deviations,
+    volume_deviation,
+)
+from naisr_model.learning.prior import Prior, prior_of
+from naisr_model.learning.target import target_of
+from naisr_model.surface.displacements import DisplacementTables, tabulate
 from naisr_model.surface.fields import distances, effect_field, shape_field, template_field
 from naisr_model.surface.isosurface import isosurface
 from naisr_model.surface.lattice import Lattice
 from naisr_model.surface.sparse import CHUNK, COARSEST, Field, evaluate_band
+from naisr_model.surface.tracking import Tracker, make_tracker
 
 Progress = Callable[[float], None]
 StopCheck = Callable[[], bool]
+
+VOLUME_RESOLUTION = 128
+CHECK_SAMPLE = 2000
+"""Seed of the points at which a fit's residual is measured; the fit itself draws others."""
+
+WORTH_TELLING = 0.05
+"""Least probability of an alternative that is told."""
+
+UNTOLD_SHARE = 0.5
+"""An interval wider than this share of the observed range says that the shape hardly tells the covariate."""
 
 
 class Atlas:
@@ -165,6 +192,87 @@ class Atlas:
         """
         return self._surface(template_field(self._network), resolution, progress, should_stop)
 
+    def tabulate(
+        self,
+        template: trimesh.Trimesh,
+        latent: ArrayLike | None = None,
+        *,
+        progress: Progress | None = None,
+        should_stop: StopCheck | None = None,
+    ) -> DisplacementTables:
+        """The displacements of one code on a lattice, what :meth:`tracker` needs; takes seconds.
+
+        Args:
+            template: a mesh that :meth:`template` gave.
+            latent: code z ``[L]``.
+            progress: told the finished share.
+            should_stop: polled between chunks of points.
+
+        Raises:
+            Cancelled: when ``should_stop()`` turned true.
+        """
+        ranges = [(float(low), float(high)) for low, high in (c.normalise(c.range) for c in self.covariates)]
+        bounds = self.frame.to_model(template.bounds)
+        code = self._latent(latent)
+        return tabulate(self._network, ranges, code, bounds, progress=progress, should_stop=should_stop)
+
+    def tracker(self, template: trimesh.Trimesh, tables: DisplacementTables) -> Tracker:
+        """What carries ``template`` to any covariates in milliseconds, vertex by vertex.
+
+        Args:
+            template: a mesh that :meth:`template` gave.
+            tables: from :meth:`tabulate`.
+        """
+        return make_tracker(self._network, self.covariates, self.frame, template, tables)
+
+    def fit(
+        self,
+        shape: trimesh.Trimesh | ArrayLike,
+        known: Values | None = None,
+        *,
+        progress: Progress | None = None,
+        should_stop: StopCheck | None = None,
+    ) -> Fit:
+        """The code and the unknown covariates that explain a patient's shape best, and how sure they are.
+
+        Args:
+            shape: a mesh, watertight or open, or points ``[n, 3]``; millimetres of the atlas frame.
+            known: covariate values in real units; those left out are inferred.
+            progress: told the finished share.
+            should_stop: polled between steps.
+
+        Raises:
+            InputError: for an unknown covariate or one out of range, or a shape that has too few points.
+            Cancelled: when ``should_stop()`` turned true.
+        """
+        started = time.perf_counter()
+        known = dict(known or {})
+        complete(self.covariates, known)
+        vector = np.array(
+            [float(c.normalise(known[c.name])) if c.name in known else np.nan for c in self.covariates]
+        )
+        binary = [i for i, covariate in enumerate(self.covariates) if covariate.kind == "binary"]
+        target = target_of(shape, self.frame)
+        fits = fit_shape(
+            self._network, target, self._prior, vector, binary, progress=progress, should_stop=should_stop
+        )
+        posterior = posterior_of(self._network, target, self._prior, fits[0])
+        check = draw_sample(target, POINTS, CHECK_SAMPLE).points[:POINTS].numpy()
+        code = torch.as_tensor(fits[0].latent, dtype=torch.float32)
+        found = torch.as_tensor(fits[0].covariates, dtype=torch.float32)
+        residuals = np.abs(distances(self._network, check, found, code))
+        return Fit(
+            Individual(self, fits[0].covariates, fits[0].latent, posterior),
+            tuple(fits),
+            tuple(covariate.name for covariate in self.covariates if covariate.name not in known),
+            residual_mm=float(residuals.mean()) * self.frame.scale_mm,
+            seconds=time.perf_counter() - started,
+        )
+
+    @cached_property
+    def _prior(self) -> Prior:
+        return prior_of(self.population, self.checkpoint.latents)
+
     def _vector(self, covariates: Values, extrapolate: bool) -> Tensor:
         values = complete(self.covariates, covariates, extrapolate=extrapolate)
         return torch.as_tensor(normalised_vector(self.covariates, values), dtype=torch.float32)
@@ -189,3 +297,199 @@ class Atlas:
             )
         lattice = Lattice(resolution)
         return isosurface(evaluate_band(field, lattice, progress, should_stop), lattice, self.frame)
+
+
+@dataclass(frozen=True, eq=False)
+class Individual:
+    """One person's shape at some covariates, with its uncertainty.
+
+    Attributes:
+        atlas: whose shape this is.
+        vector: centred covariates, ``[N]``.
+        latent: code z, ``[L]``.
+        posterior: how sure covariates and code are.
+    """
+
+    atlas: Atlas
+    vector: NDArray[np.float64]
+    latent: NDArray[np.float64]
+    posterior: Posterior
+
+    @property
+    def covariates(self) -> dict[str, float]:
+        """Real values by name."""
+        return {
+            covariate.name: float(covariate.restore(value))
+            for covariate, value in zip(self.atlas.covariates, self.vector, strict=True)
+        }
+
+    def shape(
+        self,
+        resolution: int = VOLUME_RESOLUTION,
+        *,
+        progress: Progress | None = None,
+        should_stop: StopCheck | None = None,
+    ) -> trimesh.Trimesh:
+        """The full shape in millimetres.
+
+        Raises:
+            Cancelled: when ``should_stop()`` turned true.
+        """
+        return self.atlas.shape(
+            self.covariates,
+            self.latent,
+            resolution,
+            extrapolate=True,
+            progress=progress,
+            should_stop=should_stop,
+        )
+
+    @cached_property
+    def volume_cm3(self) -> float:
+        """Volume of the shape."""
+        return float(self.surface.volume) / 1000
+
+    @cached_property
+    def volume_interval_cm3(self) -> tuple[float, float]:
+        """Where the true volume is with a probability of 95 %."""
+        surface, scale = self.surface, self.atlas.frame.scale_mm
+        if not len(surface.faces):
+            return 0.0, 0.0
+        points = self.atlas.frame.to_model(surface.sample(POINTS, seed=0)).astype(np.float32)
+        area = surface.area / scale**2
+        deviation = volume_deviation(self.posterior, points, area, self.vector, self.latent)
+        half = TWO_SIDED_95 * deviation * scale**3 / 1000
+        return max(0.0, self.volume_cm3 - half), self.volume_cm3 + half
+
+    def surface_sd_mm(self, mesh: trimesh.Trimesh) -> NDArray[np.float64]:
+        """Standard deviation along the normal at the vertices of a mesh that :meth:`shape` gave, ``[n]``."""
+        points = self.atlas.frame.to_model(mesh.vertices).astype(np.float32)
+        deviations = surface_deviations(self.posterior, points, self.vector, self.latent)
+        return deviations * self.atlas.frame.scale_mm
+
+    @cached_property
+    def surface(self) -> trimesh.Trimesh:
+        """The shape at :data:`VOLUME_RESOLUTION`, which volumes are measured on."""
+        return self.shape(VOLUME_RESOLUTION)
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """Covariates that explain a shape too, in real units, and how probable they are against the others."""
+
+    covariates: dict[str, float]
+    probability: float
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """What :meth:`Atlas.fit` found.
+
+    Attributes:
+        individual: the fitted shape with its uncertainty.
+        results: the fits at each combination of unknown binary covariates, the best first.
+        inferred: names of the covariates that were not known.
+        residual_mm: mean distance of the patient's points, others than those of the fit, to the surface.
+        seconds: what the fit took.
+    """
+
+    individual: Individual
+    results: tuple[ShapeFit, ...]
+    inferred: tuple[str, ...]
+    residual_mm: float
+    seconds: float
+
+    @property
+    def covariates(self) -> dict[str, float]:
+        """Real values by name, known and inferred ones."""
+        return self.individual.covariates
+
+    @property
+    def latent(self) -> NDArray[np.float64]:
+        """The code z, ``[L]``."""
+        return self.individual.latent
+
+    @property
+    def alternatives(self) -> tuple[Alternative, ...]:
+        """Everything that explains the shape with a probability worth telling, the best first.
+
+        One alternative means that the levels of the binary covariates are beyond doubt.
+        """
+        surprises = np.array([result.surprise for result in self.results])
+        odds = np.exp((surprises.min() - surprises) / 2)
+        told = [
+            Alternative(self._real(result.covariates), float(share))
+            for result, share in zip(self.results, odds / odds.sum(), strict=True)
+        ]
+        return tuple(one for one in told if one.probability >= WORTH_TELLING)
+
+    @property
+    def intervals(self) -> dict[str, tuple[float, float]]:
+        """Where each inferred covariate is with a probability of 95 %, real units.
+
+        Continuous covariates keep to their observed range; a binary one spans both of its levels
+        where both are possible.
+        """
+        deviations = self.individual.posterior.covariate_deviations
+        found = {}
+        for column, covariate in enumerate(self.individual.atlas.covariates):
+            if covariate.name not in self.inferred:
+                continue
+            if covariate.kind == "binary":
+                levels = [one.covariates[covariate.name] for one in self.alternatives]
+                found[covariate.name] = (min(levels), max(levels))
+            else:
+                half = TWO_SIDED_95 * deviations[column]
+                ends = covariate.restore(self.individual.vector[column] + np.array([-half, half]))
+                low, high = np.clip(ends, *covariate.range)
+                found[covariate.name] = (float(low), float(high))
+        return found
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """A sentence on each covariate that the shape does not settle."""
+        sentences = []
+        for covariate in self.individual.atlas.covariates:
+            low, high = self.intervals.get(covariate.name, (0.0, 0.0))
+            extent = covariate.range[1] - covariate.range[0]
+            if covariate.kind == "binary" and high > low:
+                sentences.append(f"the shape does not tell {covariate.name}: both levels explain it")
+            elif high - low > UNTOLD_SHARE * extent:
+                sentences.append(
+                    f"the shape hardly tells {covariate.name}: "
+                    f"anything from {covariate.format(low)} to {covariate.format(high)} explains it"
+                )
+        return tuple(sentences)
+
+    @property
+    def volume_cm3(self) -> float:
+        """Volume of the fitted shape."""
+        return self.individual.volume_cm3
+
+    @property
+    def volume_interval_cm3(self) -> tuple[float, float]:
+        """Where the true volume is with a probability of 95 %."""
+        return self.individual.volume_interval_cm3
+
+    def shape(self, resolution: int = VOLUME_RESOLUTION) -> trimesh.Trimesh:
+        """The fitted shape in millimetres."""
+        return self.individual.shape(resolution)
+
+    def surface_sd_mm(self, mesh: trimesh.Trimesh) -> NDArray[np.float64]:
+        """Standard deviation along the normal at the vertices of a mesh that :meth:`shape` gave, ``[n]``."""
+        return self.individual.surface_sd_mm(mesh)
+
+    def at(self, values: Values, *, extrapolate: bool = False) -> Individual:
+        """The same person at other covariates (the paper's shape transfer); the rest stays as fitted.
+
+        Raises:
+            InputError: for an unknown covariate or one out of range (unless ``extrapolate``).
+        """
+        atlas, person = self.individual.atlas, self.individual
+        known = complete(atlas.covariates, {**self.covariates, **values}, extrapolate=extrapolate)
+        vector = normalised_vector(atlas.covariates, known)
+        return Individual(atlas, vector, person.latent, moved(person.posterior, vector))
+
+    def _real(self, vector: NDArray[np.float64]) -> dict[str, float]:
+        pairs = zip(self.individual.atlas.covariates, vector, strict=True)
+        return {covariate.name: float(covariate.restore(value)) for covariate, value in pairs}

@@ -10,7 +10,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 from rich.console import Console
@@ -188,6 +188,177 @@ def mesh(
     print(f"{out}: {len(surface.faces)} faces, {surface.volume / 1000:.2f} cm³")
 
 
+@Parameter(name="*")
+@dataclasses.dataclass(frozen=True)
+class _Reading:
+    """How a patient's file is read.
+
+    Attributes:
+        known: covariates of the scan, as age=84,weight=20.4,sex=M; the others are inferred.
+        label: which label of a volume, its number or its name.
+        scale: millimetres per unit of the file; left out, it is guessed where the size is implausible.
+        align: none, icp or landmarks; onto the atlas's shape at the known covariates.
+        landmarks: CSV name,x,y,z in the coordinates of the file.
+    """
+
+    known: str = ""
+    label: str | None = None
+    scale: float | None = None
+    align: Literal["none", "icp", "landmarks"] = "none"
+    landmarks: Path | None = None
+
+
+_AS_IT_IS = _Reading()
+
+
+@app.command
+def fit(
+    patient: Path,
+    *,
+    atlas: Path,
+    reading: _Reading = _AS_IT_IS,
+    out: Path | None = None,
+    json_file: Annotated[Path | None, Parameter(name="--json")] = None,
+) -> None:
+    """Fit a patient's shape: covariates that are not given are inferred, all with 95 % intervals.
+
+    Args:
+        patient: a mesh, whole or in part, a label volume or a cloud of points.
+        atlas: the .safetensors file.
+        reading: how the file is read.
+        out: folder for the fitted surface, a table and a picture.
+        json_file: also write the figures to this file.
+    """
+    from naisr_model.evaluation.evolution import fit_record, write_series
+
+    fitted, intake = _fitted(patient, atlas, reading)
+    record = fit_record(fitted)
+    for covariate in fitted.individual.atlas.covariates:
+        name, interval = covariate.name, ""
+        if name in fitted.intervals:
+            low, high = (covariate.format(value) for value in fitted.intervals[name])
+            interval = f" ({low})" if low == high else f" ({low} to {high})"
+        print(f"{name}: {covariate.format(fitted.covariates[name])}{interval}")
+    for other in record["alternatives"][1:]:
+        print(f"or, with a probability of {other['probability']:.0%}: {other['covariates']}")
+    low, high = fitted.volume_interval_cm3
+    print(f"volume: {fitted.volume_cm3:.1f} cm³ ({low:.1f} to {high:.1f})")
+    print(f"residual: {fitted.residual_mm:.2f} mm, {fitted.seconds:.1f} s")
+    for sentence in fitted.remarks:
+        print(sentence)
+    if out is not None:
+        write_series(out, [fitted.individual])
+    _write_json(json_file, {"patient": intake.to_json(), **record})
+
+
+@app.command
+def transfer(
+    patient: Path,
+    *,
+    atlas: Path,
+    to: Annotated[str, Parameter(help="covariates to show the patient at, as age=120,weight=28.5")],
+    reading: _Reading = _AS_IT_IS,
+    out: Path | None = None,
+    json_file: Annotated[Path | None, Parameter(name="--json")] = None,
+) -> None:
+    """Show a patient's shape at other covariates, what makes the patient an individual kept.
+
+    Args:
+        patient: a mesh, whole or in part, a label volume or a cloud of points.
+        atlas: the .safetensors file.
+        to: the others stay as they are.
+        reading: how the file is read.
+        out: folder for both surfaces, a table and a picture.
+        json_file: also write the figures to this file.
+    """
+    from naisr_model.evaluation.evolution import parsed
+
+    fitted, intake = _fitted(patient, atlas, reading)
+    moved = fitted.at(parsed(fitted.individual.atlas, _pairs("--to", to)))
+    _tell_series(intake, [fitted.individual, moved], out, json_file)
+
+
+@app.command
+def evolve(
+    patient: Path,
+    *,
+    atlas: Path,
+    reading: _Reading = _AS_IT_IS,
+    along: str = "age",
+    start: Annotated[float | None, Parameter(name="--from")] = None,
+    stop: Annotated[float | None, Parameter(name="--to")] = None,
+    steps: int = 6,
+    path: str = "population",
+    out: Path | None = None,
+    json_file: Annotated[Path | None, Parameter(name="--json")] = None,
+) -> None:
+    """Follow a patient's shape along one covariate.
+
+    Args:
+        patient: a mesh, whole or in part, a label volume or a cloud of points.
+        atlas: the .safetensors file.
+        reading: how the file is read.
+        along: the covariate that moves.
+        start: its first value; left out, the patient's.
+        stop: its last value; left out, the largest observed one.
+        steps: shapes on the way, both ends included.
+        path: population (the others grow as usual), only (the effect of this covariate by itself), or
+            a CSV whose header names covariates, a row for each step.
+        out: folder for the surfaces, a table and a picture.
+        json_file: also write the figures to this file.
+    """
+    from naisr_model.evaluation.evolution import evolution
+
+    fitted, intake = _fitted(patient, atlas, reading)
+    _tell_series(intake, evolution(fitted, along, start, stop, steps, path), out, json_file)
+
+
+def _fitted(patient: Path, atlas: Path, reading: _Reading) -> tuple[Any, Any]:
+    """The fit, and how the file was brought into the frame of the atlas."""
+    from naisr_model.atlas import Atlas
+    from naisr_model.evaluation.evolution import parsed
+    from naisr_model.evaluation.intake import take_in
+
+    loaded = Atlas.load(atlas)
+    options = dataclasses.asdict(reading)
+    known = parsed(loaded, _pairs("--known", options.pop("known")))
+    with _stoppable() as stop:
+        intake = take_in(patient, loaded, known, **options, should_stop=stop)
+    for sentence in intake.sentences:
+        print(f"naisr: {sentence}", file=sys.stderr)
+    with _bar("fitting") as progress, _stoppable() as stop:
+        fitted = loaded.fit(intake.patient.mesh_mm, known, progress=progress, should_stop=stop)
+    return fitted, intake
+
+
+def _tell_series(intake: Any, people: Sequence[Any], out: Path | None, json_file: Path | None) -> None:
+    from naisr_model.evaluation.evolution import write_series
+
+    with _bar("measuring") as progress, _stoppable() as stop:
+        records = write_series(out, people, progress=progress, should_stop=stop)
+    for person, record in zip(people, records, strict=True):
+        where = ", ".join(c.format(person.covariates[c.name]) for c in person.atlas.covariates)
+        low, high = record["volume_low_cm3"], record["volume_high_cm3"]
+        print(f"{where}: {record['volume_cm3']:.1f} cm³ ({low:.1f} to {high:.1f})")
+    _write_json(json_file, {"patient": intake.to_json(), "shapes": records})
+
+
+def _write_json(path: Path | None, record: object) -> None:
+    from naisr_model.files import replacing
+
+    if path is not None:
+        with replacing(path) as temporary:
+            temporary.write_text(json.dumps(record, indent=1), encoding="utf-8")
+
+
+def _pairs(option: str, text: str) -> dict[str, str]:
+    """``age=84,sex=M`` as names and texts."""
+    pairs = [part.partition("=") for part in text.split(",") if part.strip()]
+    if wrong := [name for name, equals, _ in pairs if not equals]:
+        raise InputError(f"'{wrong[0]}' after {option} is not understood; write NAME=VALUE,NAME=VALUE")
+    return {name.strip(): value for name, _, value in pairs}
+
+
 @app.command
 def info(atlas: Path) -> None:
     """Show what an atlas is made of."""
@@ -220,7 +391,6 @@ def reconstruction(
     *,
     store: Path | None = None,
     json_file: Annotated[Path | None, Parameter(name="--json")] = None,
-    steps: int = 200,
     limit: int = 0,
 ) -> None:
     """Refit the held-out shapes with their covariates known, and check the effects where the truth is known.
@@ -230,7 +400,6 @@ def reconstruction(
         store: where its held-out shapes are; not needed for the synthetic populations, which are
             made again from their seed.
         json_file: also write the figures to this file.
-        steps: Adam steps of each fit.
         limit: at most so many held-out shapes; 0 takes all.
     """
     from naisr_model.atlas import Atlas
@@ -240,13 +409,10 @@ def reconstruction(
     from naisr_model.evaluation.tables import PUBLISHED_AIRWAY, reconstruction_markdown
     from naisr_model.files import replacing
 
-    if steps < 1 or limit < 0:
-        raise InputError(
-            f"--steps {steps} --limit {limit} make no sense; give at least 1 step, limit 0 or more"
-        )
+    if limit < 0:
+        raise InputError(f"--limit is {limit}; give 0 or more")
     loaded = Atlas.load(atlas)
     config = EvaluationConfig(limit=limit)
-    config = dataclasses.replace(config, fit=dataclasses.replace(config.fit, steps=steps))
     with _bar("evaluating") as progress, _stoppable() as stop:
         report = run(
             loaded,
@@ -259,6 +425,94 @@ def reconstruction(
     if json_file is not None:
         with replacing(json_file) as temporary:
             temporary.write_text(json.dumps(report, indent=1), encoding="utf-8")
+
+
+@evaluate.command
+def fitting(
+    atlas: Path,
+    *,
+    store: Path | None = None,
+    json_file: Annotated[Path | None, Parameter(name="--json")] = None,
+    limit: int = 50,
+) -> None:
+    """Compare the fit with the paper's procedure on held-out shapes; the latter takes a minute a shape.
+
+    Args:
+        atlas: the .safetensors file.
+        store: where its held-out shapes are; not needed for the synthetic populations.
+        json_file: also write the figures to this file.
+        limit: at most so many held-out shapes.
+    """
+    from naisr_model.atlas import Atlas
+    from naisr_model.config import FitConfig
+    from naisr_model.data.store import SampleStore
+    from naisr_model.evaluation.fitting import compare_fits, comparison_markdown
+    from naisr_model.evaluation.reconstruction import held_out_shapes
+
+    if limit < 1:
+        raise InputError(f"--limit is {limit}; give at least 1")
+    loaded = Atlas.load(atlas)
+    shapes = held_out_shapes(loaded, None if store is None else SampleStore.open(store), limit)
+    with _bar("fitting") as progress, _stoppable() as stop:
+        report = compare_fits(loaded, shapes, FitConfig(), progress=progress, should_stop=stop)
+    print(comparison_markdown(report, FitConfig()))
+    _write_json(json_file, report)
+
+
+@evaluate.command
+def calibration(
+    atlas: Path,
+    *,
+    patients: int = 200,
+    known: Annotated[str, Parameter(help="covariates that the fits are told, as age,sex")] = "",
+    json_file: Annotated[Path | None, Parameter(name="--json")] = None,
+) -> None:
+    """Count how often the 95 % intervals of a fit hold the truth, over new synthetic patients.
+
+    Args:
+        atlas: the .safetensors file, of a synthetic population.
+        patients: how many are made and fitted.
+        known: the others are inferred.
+        json_file: also write the figures to this file.
+    """
+    from naisr_model.atlas import Atlas
+    from naisr_model.evaluation.calibration import calibration as run
+    from naisr_model.evaluation.calibration import calibration_markdown
+
+    if patients < 1:
+        raise InputError(f"--patients is {patients}; give at least 1")
+    names = [name.strip() for name in known.split(",") if name.strip()]
+    with _bar("fitting") as progress, _stoppable() as stop:
+        report = run(Atlas.load(atlas), patients, names, progress=progress, should_stop=stop)
+    print(calibration_markdown(report))
+    _write_json(json_file, report)
+
+
+@app.command
+def bench(
+    atlas: Path | None = None,
+    *,
+    json_file: Annotated[Path | None, Parameter(name="--json")] = None,
+    quick: Annotated[bool, Parameter(negative=())] = False,
+) -> None:
+    """Measure how fast everything is on this machine, at the paper's network size; takes some minutes.
+
+    Args:
+        atlas: the .safetensors file; left out, the airway atlas that comes with the program.
+        json_file: also write the figures to this file.
+        quick: see in less than a minute that everything runs; the figures then say little.
+    """
+    from naisr_model.evaluation.bench import QUICK, Scope, default_atlas, markdown
+    from naisr_model.evaluation.bench import bench as run
+    from naisr_model.files import replacing
+
+    scope = QUICK if quick else Scope()
+    with _bar("measuring") as progress, _stoppable() as stop:
+        record = run(atlas or default_atlas(), scope, progress=progress, should_stop=stop)
+    print(markdown(record, scope))
+    if json_file is not None:
+        with replacing(json_file) as temporary:
+            temporary.write_text(json.dumps(record, indent=1), encoding="utf-8")
 
 
 def _values(atlas: Any, settings: list[str]) -> dict[str, float]:

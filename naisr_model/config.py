@@ -143,7 +143,7 @@ class Preset:
 
 @dataclass(frozen=True)
 class FitConfig:
-    """How a latent code is fitted to one shape (section "Testing" of the paper).
+    """The paper's procedure of fitting a code (section "Testing"), kept as the reference for the fast one.
 
     Attributes:
         steps: Adam steps.

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
+import time
 from collections.abc import Mapping, Sequence
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -22,6 +24,9 @@ if TYPE_CHECKING:
     from naisr_viewer.controller import Controller
     from naisr_viewer.state import AtlasCard
     from naisr_viewer.views.main_window import MainWindow
+
+LOADED = time.monotonic()
+"""When the program was loaded, where the system does not tell when it was started."""
 
 DEFAULT_ATLAS = "airway.safetensors"
 
@@ -60,6 +65,7 @@ def view(
     settings: Annotated[list[str] | None, Parameter("--set", negative=())] = None,
     screenshot: Path | None = None,
     demo: Path | None = None,
+    measure: Path | None = None,
     size: str = "1280x800",
 ) -> int:
     """Open the window on an atlas.
@@ -75,6 +81,9 @@ def view(
     demo
         Drag every slider from end to end, write pictures and meshes into this folder and end;
         needs no display.
+    measure
+        Time the start and a drag of a slider, write the figures to this JSON file and end;
+        needs no display.
     size
         Size of the window in pixels, WIDTHxHEIGHT.
     """
@@ -83,7 +92,10 @@ def view(
     if not path.is_file():
         raise InputError(f"there is no file {path}; give the path of an atlas (.safetensors)")
     leave_a_core_to_the_window()
+    gc.set_threshold(50_000)  # imports make many objects that stay; looking for garbage among them is a tenth
     engine = Engine()
+    if measure is not None:
+        return _measured(engine, path, pixels, measure)
     card = engine.open(path) if settings or screenshot or demo else None
     values = parse_settings(card, settings or []) if card else {}
     if card is not None and (screenshot or demo):
@@ -155,7 +167,7 @@ def make_window(engine: Engine, settings_file: Path | None = None) -> tuple[Main
     else:
         settings = QSettings(str(settings_file), QSettings.Format.IniFormat)
     window = MainWindow()
-    return window, Controller(window, engine, Worker(), settings)
+    return window, Controller(window, engine, Worker(), Worker(), settings)
 
 
 def make_application() -> QApplication:
@@ -173,21 +185,61 @@ def _attended(
     engine: Engine, path: Path, card: AtlasCard | None, values: Mapping[str, float], pixels: tuple[int, int]
 ) -> int:
     """The window in the hands of a person, until it is closed."""
-    from naisr_viewer.headless import has_display
+    from naisr_viewer.display import has_display
 
     if not has_display():
-        raise InputError("there is no display; use --screenshot or --demo, which need none")
+        raise InputError("there is no display; use --screenshot, --demo or --measure, which need none")
     app = make_application()
     window, controller = make_window(engine)
-    sys.excepthook = controller.report
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # so that Ctrl+C in the terminal ends the program
-    window.resize(*pixels)
-    window.show()
-    if card is None:
-        controller.open(path)
-    else:
-        controller.show_atlas(card, values)
+    _show(window, controller, path, card, values, pixels)
     return app.exec()
+
+
+def _show(
+    window: MainWindow,
+    controller: Controller,
+    path: Path,
+    card: AtlasCard | None,
+    values: Mapping[str, float],
+    pixels: tuple[int, int],
+) -> None:
+    """Put the window on the screen first; what takes long starts behind it."""
+
+    def begin() -> None:
+        window.shapes.prepare()
+        if card is None:
+            controller.open(path)
+        else:
+            controller.show_atlas(card, values)
+
+    sys.excepthook = controller.report
+    window.resize(*pixels)
+    window.show_opening(path.name)
+    window.appeared.connect(begin)
+    window.show()
+
+
+def _measured(engine: Engine, path: Path, pixels: tuple[int, int], file: Path) -> int:
+    """The window as a person starts and drags it, with a stop-watch; leaves the user's settings alone."""
+    from naisr_viewer.display import ensure_display
+
+    before = time.monotonic()
+    ensure_display(pixels)
+    display_s = time.monotonic() - before  # whoever sits at a display does not wait for a virtual one
+    make_application()
+    with TemporaryDirectory(prefix="naisr-viewer-") as folder:
+        window, controller = make_window(engine, Path(folder) / "settings.ini")
+        from naisr_viewer.measure import Observer, measure, process_start
+
+        observer = Observer(window, controller)
+        _show(window, controller, path, None, {}, pixels)
+        try:
+            measure(window, controller, engine, observer, process_start(LOADED) + display_s, file)
+        finally:
+            window.close()
+    print(f"wrote {file}")
+    return 0
 
 
 def _unattended(
@@ -200,8 +252,9 @@ def _unattended(
 ) -> int:
     """The same window without a person; leaves no trace in the user's settings."""
     from naisr_viewer import headless
+    from naisr_viewer.display import ensure_display
 
-    headless.ensure_display(pixels)
+    ensure_display(pixels)
     make_application()
     with TemporaryDirectory(prefix="naisr-viewer-") as folder:
         window, controller = make_window(engine, Path(folder) / "settings.ini")

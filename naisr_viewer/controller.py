@@ -17,6 +17,7 @@ from naisr_viewer.requests import (
     EXACT_RESOLUTION,
     PREVIEW_RESOLUTION,
     ExportChoice,
+    Origin,
     SurfaceRequest,
     SurfaceResult,
     answers,
@@ -46,6 +47,10 @@ PATIENCE_MS = 1000
 """Work shorter than this shows no progress bar."""
 
 RECENT_FILES = 8
+DOUBTFUL = "preview uncertain"
+DOUBTFUL_HINT = (
+    "The deformation folds here, so the preview may lack or invent pieces; the exact surface follows at rest."
+)
 UNSEEN = "outside the data"
 UNSEEN_HINT = (
     "Hardly anyone behind the atlas is near this combination of covariates (those not moved here are at "
@@ -84,21 +89,26 @@ class Controller(QObject):
         window: shows the state.
         engine: computes surfaces.
         worker: runs the engine beside the window.
+        background: does what nobody waits for.
         settings: remembers recent files and the theme.
     """
 
     settled = Signal()  # everything on screen is exact, or the computation ended otherwise
 
-    def __init__(self, window: MainWindow, engine: Engine, worker: Worker, settings: QSettings) -> None:
+    def __init__(
+        self, window: MainWindow, engine: Engine, worker: Worker, background: Worker, settings: QSettings
+    ) -> None:
         super().__init__()
         self.state = ExplorerState()
         self.shown: dict[Panel, SurfaceResult] = {}
-        self._window, self._engine, self._worker, self._settings = window, engine, worker, settings
+        self._window, self._engine, self._settings = window, engine, settings
+        self._worker, self._background = worker, background
         self._history = History()
         self._before_move: ExplorerState | None = None
         self._task = Task.NOTHING
         self._halted = ""
         self._notice = ""
+        self._preparing: Path | None = None
         self._patience = QTimer(self, singleShot=True, interval=PATIENCE_MS)
         self._connect()
         window.show_recent(self._recent())
@@ -133,6 +143,7 @@ class Controller(QObject):
     def show_atlas(self, card: AtlasCard, values: Mapping[str, float] = MappingProxyType({})) -> None:
         """Show an atlas that is open in the engine; covariates left out are at their mean."""
         self.shown = {}
+        self._preparing = None
         self._history = History()
         self._before_move = None
         self._remember(card.path)
@@ -233,8 +244,9 @@ class Controller(QObject):
         self._window.show_error(in_words(error))
 
     def shutdown(self) -> None:
-        """Stop the worker and all timers; nothing happens afterwards."""
+        """Stop the workers and all timers; nothing happens afterwards."""
         self._patience.stop()
+        self._background.close()
         self._worker.close()
 
     def _connect(self) -> None:
@@ -257,6 +269,7 @@ class Controller(QObject):
         worker.progressed.connect(self._progressed)
         worker.failed.connect(self._failed)
         worker.idle.connect(self._idle)
+        self._background.failed.connect(self._background_failed)
         self._patience.timeout.connect(lambda: self._window.show_progress(0.0))
 
     def _commit(self, before: ExplorerState, after: ExplorerState) -> None:
@@ -297,12 +310,26 @@ class Controller(QObject):
         if self._task is Task.EXACT or not (coarse or fine):
             self._worker.cancel()
         if coarse:
-            self._start(Task.PREVIEW, self._surfaces_job(coarse))
+            self._start(Task.PREVIEW, self._frame_job(coarse))
         elif fine:
             self._start(Task.EXACT, self._surfaces_job(fine))
         self._show_status()
 
+    def _frame_job(self, requests: list[SurfaceRequest]) -> Job:
+        """All surfaces of one moment, handed over together so that they are painted together."""
+        engine = self._engine
+
+        def job(
+            deliver: Callable[[object], None],
+            progress: Callable[[float], None],
+            should_stop: Callable[[], bool],
+        ) -> None:
+            deliver(tuple(engine.surface(request, None, should_stop) for request in requests))
+
+        return job
+
     def _surfaces_job(self, requests: list[SurfaceRequest]) -> Job:
+        """Surfaces that are handed over one by one, because each takes a while."""
         engine = self._engine
 
         def job(
@@ -311,9 +338,26 @@ class Controller(QObject):
             should_stop: Callable[[], bool],
         ) -> None:
             for place, request in enumerate(requests):
-                deliver(engine.surface(request, _part(progress, place, len(requests)), should_stop))
+                deliver((engine.surface(request, _part(progress, place, len(requests)), should_stop),))
 
         return job
+
+    def _prepare_previews(self) -> None:
+        """Make previews of the open atlas fast, once everything that somebody waits for is done."""
+        atlas, engine = self.state.atlas, self._engine
+        if atlas is None or self._preparing == atlas.path or engine.has_previews(atlas.path):
+            return
+        path = self._preparing = atlas.path
+
+        def job(
+            deliver: Callable[[object], None],
+            progress: Callable[[float], None],
+            should_stop: Callable[[], bool],
+        ) -> None:
+            engine.prepare_previews(path, progress, should_stop)
+
+        self._background.cancel()
+        self._background.submit(job)
 
     def _start(self, task: Task, job: Job) -> None:
         if task in (Task.OPENING, Task.EXPORT):
@@ -331,8 +375,9 @@ class Controller(QObject):
             self.show_atlas(item)
         elif isinstance(item, ExportReport):
             self._notice = item.sentence
-        elif isinstance(item, SurfaceResult) and self._is_wanted(item):
-            self._show(item)
+        elif isinstance(item, tuple):
+            for result in filter(self._is_wanted, item):
+                self._show(result)
             self._show_status()
 
     def _is_wanted(self, result: SurfaceResult) -> bool:
@@ -356,6 +401,8 @@ class Controller(QObject):
             return "no surface at these values", "The signed distance is nowhere zero inside the box."
         digits = 1 if result.volume_cm3 < 1000 else 0
         text = f'<span style="font-size:12pt">{result.volume_cm3:,.{digits}f} cm³</span>'
+        if result.doubtful:
+            return f"{text}<br>{DOUBTFUL}", DOUBTFUL_HINT
         if is_seen(self.state.atlas.population, dict(result.request.values)):
             return text, "Enclosed volume"
         return f"{text}<br>{UNSEEN}", UNSEEN_HINT
@@ -371,6 +418,10 @@ class Controller(QObject):
             self._halted = "Stopped by an error"
         self._window.show_error(in_words(error))
 
+    def _background_failed(self, error: Exception) -> None:
+        if not isinstance(error, Cancelled):
+            self._window.show_error(f"Previews stay coarse: {in_words(error)}")
+
     def _idle(self) -> None:
         was, self._task = self._task, Task.NOTHING
         if was is Task.OPENING:
@@ -384,6 +435,7 @@ class Controller(QObject):
             self._window.show_progress(None)
             self._show_status()
             self.settled.emit()
+            self._prepare_previews()
 
     def _show_status(self) -> None:
         self._window.show_status(self._status())
@@ -399,9 +451,7 @@ class Controller(QObject):
             return f"{self._halted} · {behind} show earlier values"
         if self._missing(0) and not coarse:
             return f"Updating {behind} …"
-        seconds = sum({id(result.points_mm): result.seconds for result in coarse or exact}.values())
-        size = (coarse or exact)[0].request.resolution
-        text = f"{'Preview' if coarse else 'Exact'} {size}³ in {seconds:.2g} s"
+        text = _in_short(coarse or exact)
         if self._task is Task.EXACT:
             text += f" · refining to {EXACT_RESOLUTION}³, {len(exact)} of {len(shown)} views done"
         return " · ".join(filter(None, (text, self._halted, self._notice)))
@@ -415,6 +465,17 @@ class Controller(QObject):
         recent = [path, *(other for other in self._recent() if other != path)][:RECENT_FILES]
         self._settings.setValue("recent", [str(each) for each in recent])
         self._window.show_recent(recent)
+
+
+def _in_short(results: list[SurfaceResult]) -> str:
+    """What these surfaces are, how long they took, and how far off their previews were."""
+    seconds = sum({id(result.points_mm): result.seconds for result in results}.values())
+    if results[0].origin is Origin.TABLES:
+        return f"Preview in {1000 * seconds:.0f} ms"
+    size = results[0].request.resolution
+    text = f"{'Exact' if results[0].is_exact else 'Preview'} {size}³ in {seconds:.2g} s"
+    errors = [result.preview_error_mm for result in results if result.preview_error_mm is not None]
+    return f"{text} · 99 % of the preview was within {max(0.01, *errors):.2f} mm" if errors else text
 
 
 def in_words(error: BaseException) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
 import time
 from collections import OrderedDict
 from collections.abc import Callable
@@ -11,10 +13,12 @@ from threading import Lock
 from typing import TYPE_CHECKING
 
 import numpy as np
+import platformdirs
+from numpy.typing import NDArray
 
 from naisr_model import __version__ as VERSION
 from naisr_model.errors import Cancelled, InputError
-from naisr_viewer.requests import SurfaceRequest, SurfaceResult
+from naisr_viewer.requests import EXACT_RESOLUTION, Origin, SurfaceRequest, SurfaceResult
 from naisr_viewer.state import TEMPLATE, AtlasCard, Panel
 
 if TYPE_CHECKING:
@@ -22,6 +26,8 @@ if TYPE_CHECKING:
 
     from naisr_model.atlas import Atlas
     from naisr_model.covariates import Covariate
+    from naisr_model.surface.displacements import DisplacementTables
+    from naisr_model.surface.tracking import Tracked, Tracker
 
 __all__ = ["VERSION", "Cancelled", "Engine", "InputError", "load_atlas"]
 
@@ -30,6 +36,9 @@ CACHED_SURFACES = 96
 
 OPEN_ATLASES = 2
 """How many atlases are kept loaded, so that going back to the last one is instant."""
+
+KEPT_TABLES = 8
+"""How many atlases' tabulated displacements are kept on disk; some MB each."""
 
 Progress = Callable[[float], None]
 ShouldStop = Callable[[], bool]
@@ -42,17 +51,26 @@ def load_atlas(path: Path) -> Atlas:
     return Atlas.load(path)
 
 
+def cache_folder() -> Path:
+    """Where tabulated displacements are kept between two runs of the program."""
+    return platformdirs.user_cache_path("naisr-viewer", appauthor=False)
+
+
 class Engine:
     """Opens atlases and answers surface requests, remembering the recent answers.
 
     Args:
         load: reads an atlas file; raises :class:`InputError` on one it cannot use.
+        cache: folder for tabulated displacements.
     """
 
-    def __init__(self, load: Callable[[Path], Atlas] = load_atlas) -> None:
+    def __init__(self, load: Callable[[Path], Atlas] = load_atlas, cache: Path | None = None) -> None:
         self._load = load
+        self._cache = cache or cache_folder()
         self._lock = Lock()
         self._atlases: OrderedDict[Path, Atlas] = OrderedDict()
+        self._trackers: dict[Path, Tracker] = {}
+        self._tracked: dict[tuple[Path, Panel], Tracked] = {}
         self._results: OrderedDict[SurfaceRequest, SurfaceResult] = OrderedDict()
 
     def open(self, path: Path) -> AtlasCard:
@@ -72,10 +90,65 @@ class Engine:
             self._atlases[path] = atlas
             self._atlases.move_to_end(path)
             while len(self._atlases) > OPEN_ATLASES:
-                self._atlases.popitem(last=False)
+                self._forget(self._atlases.popitem(last=False)[0])
+            self._forget(path)
             for stale in [request for request in self._results if request.atlas == path]:
                 del self._results[stale]
         return AtlasCard(path, atlas.name, tuple(atlas.covariates), atlas.population)
+
+    def _forget(self, path: Path) -> None:
+        self._trackers.pop(path, None)
+        for key in [key for key in self._tracked if key[0] == path]:
+            del self._tracked[key]
+
+    def prepare_previews(
+        self, path: Path, progress: Progress | None = None, should_stop: ShouldStop | None = None
+    ) -> None:
+        """Make previews of an open atlas fast: tabulate its displacements, or read them from the disk.
+
+        Raises:
+            Cancelled: when ``should_stop()`` turned true.
+        """
+        import trimesh
+
+        with self._lock:
+            atlas = self._atlases[path]
+        shown = self.surface(SurfaceRequest(path, TEMPLATE, (), EXACT_RESOLUTION), None, should_stop)
+        if not len(shown.faces):
+            return
+        template = trimesh.Trimesh(shown.points_mm, shown.faces, process=False)
+        tables = self._tables(path, atlas, template, progress, should_stop)
+        tracker = atlas.tracker(template, tables)
+        with self._lock:
+            if self._atlases.get(path) is atlas:
+                self._trackers[path] = tracker
+
+    def has_previews(self, path: Path) -> bool:
+        """Whether :meth:`prepare_previews` is done for an atlas."""
+        return path in self._trackers
+
+    def _tables(
+        self,
+        path: Path,
+        atlas: Atlas,
+        template: trimesh.Trimesh,
+        progress: Progress | None,
+        should_stop: ShouldStop | None,
+    ) -> DisplacementTables:
+        """Those on the disk for exactly this file, or new ones; a cache that fails costs time, no more."""
+        from naisr_model.surface.displacements import RECIPE, DisplacementTables
+
+        key = hashlib.sha256(path.read_bytes() + RECIPE.encode()).hexdigest()[:32]
+        file = self._cache / f"{key}.displacements.safetensors"
+        with contextlib.suppress(InputError):
+            return DisplacementTables.load(file)
+        tables = atlas.tabulate(template, progress=progress, should_stop=should_stop)
+        with contextlib.suppress(OSError):
+            tables.save(file)
+            kept = sorted(self._cache.glob("*.displacements.safetensors"), key=lambda f: f.stat().st_mtime)
+            for old in kept[:-KEPT_TABLES]:
+                old.unlink(missing_ok=True)
+        return tables
 
     def cached(self, request: SurfaceRequest) -> SurfaceResult | None:
         """The answer, if it is remembered; instant."""
@@ -102,17 +175,30 @@ class Engine:
         if (remembered := self.cached(request)) is not None:
             return remembered
         with self._lock:
-            atlas = self._atlases[request.atlas]
-        question = simplest(request, atlas.covariates)
+            atlas, tracker = self._atlases[request.atlas], self._trackers.get(request.atlas)
         start = time.perf_counter()
+        if tracker is not None and request.resolution < EXACT_RESOLUTION:
+            return _tracked_result(request, tracker, self._track(request, tracker), start)
+        question = simplest(request, atlas.covariates)
         result = _result(question, _mesh(atlas, question, progress, should_stop), start)
         if should_stop is not None and should_stop():
             raise Cancelled
+        if tracker is not None and len(result.faces):
+            error_mm = _deviation_mm(self._track(request, tracker).points_mm, result)
+            result = replace(result, preview_error_mm=error_mm)
         with self._lock:
             self._results[question] = result
             while len(self._results) > CACHED_SURFACES:
                 self._results.popitem(last=False)
         return replace(result, request=request)
+
+    def _track(self, request: SurfaceRequest, tracker: Tracker) -> Tracked:
+        """Carry the template, beginning where the panel's last preview ended."""
+        key = (request.atlas, request.panel)
+        tracked = tracker.track(dict(request.values), self._tracked.get(key))
+        if tracked.is_trustworthy:
+            self._tracked[key] = tracked
+        return tracked
 
 
 def simplest(request: SurfaceRequest, covariates: tuple[Covariate, ...]) -> SurfaceRequest:
@@ -141,6 +227,32 @@ def _mesh(
     return atlas.shape(dict(request.values), resolution=size, progress=progress, should_stop=should_stop)
 
 
+def _tracked_result(
+    request: SurfaceRequest, tracker: Tracker, tracked: Tracked, start: float
+) -> SurfaceResult:
+    from naisr_model.surface.tracking import enclosed_volume
+
+    return SurfaceResult(
+        request=request,
+        points_mm=tracked.points_mm,
+        normals=tracked.normals,
+        faces=tracker.faces,
+        volume_cm3=enclosed_volume(tracked.points_mm, tracker.faces) / 1000.0,
+        seconds=time.perf_counter() - start,
+        origin=Origin.TABLES,
+        doubtful=not tracked.is_trustworthy,
+    )
+
+
+def _deviation_mm(points_mm: NDArray[np.float32], exact: SurfaceResult) -> float:
+    """Distance to the exact surface that 99 % of the points keep, along the normal of the nearest vertex."""
+    from scipy.spatial import cKDTree
+
+    nearest = cKDTree(exact.points_mm).query(points_mm)[1]
+    offsets = points_mm - exact.points_mm[nearest]
+    return float(np.quantile(np.abs(np.sum(offsets * exact.normals[nearest], axis=1)), 0.99))
+
+
 def _result(request: SurfaceRequest, mesh: trimesh.Trimesh, start: float) -> SurfaceResult:
     empty = len(mesh.faces) == 0
     normals = np.zeros((0, 3)) if empty else mesh.vertex_normals
@@ -151,4 +263,5 @@ def _result(request: SurfaceRequest, mesh: trimesh.Trimesh, start: float) -> Sur
         faces=np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3),
         volume_cm3=0.0 if empty else float(mesh.volume) / 1000.0,
         seconds=time.perf_counter() - start,
+        origin=Origin.NETWORK,
     )

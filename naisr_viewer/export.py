@@ -10,8 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyvista as pv
-import trimesh
 
 from naisr_viewer.engine import VERSION, InputError
 from naisr_viewer.requests import FORMATS, SurfaceResult
@@ -102,10 +100,14 @@ def _covariate_record(covariate: Covariate, value: float) -> dict[str, Any]:
 
 def _write_mesh(path: Path, ending: str, result: SurfaceResult) -> None:
     if ending == "vtp":
+        import pyvista as pv  # here, and trimesh below, because they would slow down the start
+
         mesh = pv.PolyData.from_regular_faces(result.points_mm, result.faces)
         mesh.point_data.active_normals = result.normals
         mesh.save(path)
         return
+    import trimesh
+
     points = np.asarray(result.points_mm, dtype=np.float64)
     surface = trimesh.Trimesh(points, result.faces, vertex_normals=result.normals, process=False)
     surface.export(path, file_type=ending)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum, auto
 from pathlib import Path
 
 import numpy as np
@@ -11,13 +12,20 @@ from numpy.typing import NDArray
 from naisr_viewer.state import Named, Panel
 
 PREVIEW_RESOLUTION = 40
-"""Lattice points per edge while a slider moves."""
+"""Cells along a side of the box while a slider moves and displacements are not tabulated yet."""
 
 EXACT_RESOLUTION = 128
-"""Lattice points per edge at rest."""
+"""Cells along a side of the box at rest; also the density of a preview by tabulated displacements."""
 
 FORMATS = ("stl", "ply", "obj", "vtp", "glb")
 """Mesh files that can be written."""
+
+
+class Origin(Enum):
+    """How a surface was found."""
+
+    NETWORK = auto()  # the zero level set of the networks on a lattice
+    TABLES = auto()  # the template's surface, carried by tabulated displacements
 
 
 @dataclass(frozen=True)
@@ -28,7 +36,7 @@ class SurfaceRequest:
         atlas: the file of the atlas.
         panel: which of its surfaces.
         values: the covariate values (real units) the surface depends on.
-        resolution: lattice points per edge of the box.
+        resolution: cells along a side of the box; below :data:`EXACT_RESOLUTION` a preview is wanted.
     """
 
     atlas: Path
@@ -48,6 +56,10 @@ class SurfaceResult:
         faces: vertex numbers of the triangles, int64 ``[m, 3]``; none where no surface exists.
         volume_cm3: enclosed volume.
         seconds: how long it took to compute; equal surfaces share one computation and its arrays.
+        origin: how it was found.
+        doubtful: the deformation folds, so that a preview may lack or invent pieces.
+        preview_error_mm: of an exact surface: the distance within which 99 % of the preview's vertices
+            lay; None where there was no preview by tabulated displacements.
     """
 
     request: SurfaceRequest
@@ -56,11 +68,14 @@ class SurfaceResult:
     faces: NDArray[np.int64]
     volume_cm3: float
     seconds: float
+    origin: Origin
+    doubtful: bool = False
+    preview_error_mm: float | None = None
 
     @property
     def is_exact(self) -> bool:
         """Whether this is as fine as the window shows at rest."""
-        return self.request.resolution >= EXACT_RESOLUTION
+        return self.origin is Origin.NETWORK and self.request.resolution >= EXACT_RESOLUTION
 
 
 def answers(result: SurfaceResult | None, request: SurfaceRequest) -> bool:
@@ -81,7 +96,7 @@ class ExportChoice:
     Attributes:
         panels: the surfaces.
         format: one of :data:`FORMATS`.
-        resolution: lattice points per edge.
+        resolution: cells along a side of the box.
         folder: made when it is missing.
     """
 

@@ -45,7 +45,7 @@ class Rule:
 COVARIATES = "naisr_model.covariates"
 ERRORS = "naisr_model.errors"
 VIEWS = "naisr_viewer.views"
-SHAPE_VIEW = "naisr_viewer.views.shape_view"
+CANVAS = "naisr_viewer.views.canvas"
 NO_QT = tuple(f"naisr_viewer.{name}" for name in ("state", "requests", "engine", "session", "export"))
 GROUND = ("naisr_model", *(f"naisr_model.{name}" for name in FLOORS[1]))
 
@@ -60,7 +60,7 @@ RULES = (
     ),
     Rule(("naisr_viewer.state", VIEWS + "*"), ("naisr_model",), allowed=(ERRORS, COVARIATES)),
     Rule(("naisr_viewer*",), ("torch",), but_not=("naisr_viewer.engine",)),
-    Rule(("naisr_viewer*",), ("pyvistaqt",), but_not=(SHAPE_VIEW,)),
+    Rule(("naisr_viewer*",), ("pyvistaqt",), but_not=(CANVAS,)),
     Rule(NO_QT, (*QT, VIEWS)),
     Rule(("naisr_viewer.worker",), ("naisr_viewer.engine", VIEWS)),
     Rule((VIEWS + "*",), tuple(f"naisr_viewer.{name}" for name in ("app", "controller", "engine", "worker"))),
@@ -194,7 +194,7 @@ SOUND = {
     "naisr_viewer/controller.py": "from naisr_viewer import engine, state, worker",
     "naisr_viewer/views/__init__.py": "",
     "naisr_viewer/views/panel.py": "from naisr_model.covariates import Covariate\nimport PySide6",
-    "naisr_viewer/views/shape_view.py": "from pyvistaqt import QtInteractor",
+    "naisr_viewer/views/canvas.py": "from pyvistaqt import QtInteractor",
     "naisr_viewer/app.py": "from .controller import Controller",
     "naisr_viewer/__main__.py": "from naisr_viewer.app import main",
 }

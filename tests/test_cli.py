@@ -64,7 +64,7 @@ def test_evaluating_shapes_of_one_s_own(naisr, egg_atlas, egg_store, tmp_path):
     target = tmp_path / "figures.json"
     code, out, _ = naisr(
         "evaluate", "reconstruction", egg_atlas, "--store", egg_store.path,
-        "--json", target, "--steps", 30, "--limit", 2,
+        "--json", target, "--limit", 2,
     )  # fmt: skip
     figures = json.loads(target.read_text())
     assert code == 0 and "cm³" in out and figures["n"] == 2

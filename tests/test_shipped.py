@@ -7,7 +7,6 @@ import pytest
 import torch
 
 from naisr_model.atlas import Atlas
-from naisr_model.config import FitConfig
 from naisr_model.covariates import normalised_vector
 from naisr_model.data.align import rigid_transform
 from naisr_model.data.populations import airway
@@ -85,7 +84,7 @@ def test_patients_are_held_out_whole(atlas):
 
 
 def test_the_band_misses_nothing_of_a_real_atlas(atlas):
-    network, lattice, rng = atlas.checkpoint.network(), Lattice(48), np.random.default_rng(0)
+    network, lattice, rng = atlas.checkpoint.network(), Lattice(64), np.random.default_rng(0)
     low, high = np.array([covariate.range for covariate in atlas.covariates]).T
     for _ in range(3):
         values = dict(zip(atlas.population.names, rng.uniform(low, high), strict=True))
@@ -100,7 +99,7 @@ def test_the_band_misses_nothing_of_a_real_atlas(atlas):
 
 def test_unseen_patients_are_reconstructed(atlas):
     shapes = held_out_shapes(atlas, store=None, limit=3)
-    latents = fit_all(atlas, shapes, FitConfig(steps=100, surface_points=128, space_points=128))
+    latents = fit_all(atlas, shapes)
     for shape, latent in zip(shapes, latents, strict=True):
         distances = compare(
             shape.mesh_mm, atlas.shape(shape.values, latent, extrapolate=True), emd_samples=50

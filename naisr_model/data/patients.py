@@ -1,7 +1,7 @@
 """One patient's shape: reading it from any file, finding what is wrong with it, and setting that right.
 
 >>> patient = read_patient("scan.nii.gz", label=2)  # doctest: +SKIP
->>> patient, findings = repaired(patient, atlas.frame)  # doctest: +SKIP
+>>> patient, done, left = repaired(patient, atlas.frame)  # doctest: +SKIP
 """
 
 from __future__ import annotations
@@ -50,12 +50,17 @@ class Patient:
         source: what was read, for example ``p01.nii.gz, label 2 'airway'``.
         space: ``LPS`` or ``RAS`` where the file says it, else empty.
         remarks: what was odd about the file, a sentence each.
+        from_file: 4x4, coordinates as they were read to those of ``mesh_mm``, by every repair and
+            motion since; landmarks of the file go the same way.
+        units_known: whether a person said how long a unit is, so that it is not guessed.
     """
 
     mesh_mm: trimesh.Trimesh
     source: str = ""
     space: Literal["LPS", "RAS", ""] = ""
     remarks: tuple[str, ...] = ()
+    from_file: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
+    units_known: bool = False
 
     @property
     def is_cloud(self) -> bool:
@@ -90,13 +95,13 @@ class Finding:
 # --- reading ------------------------------------------------------------------------------------
 
 
-def read_patient(path: str | Path, label: int | None = None) -> Patient:
+def read_patient(path: str | Path, label: int | str | None = None) -> Patient:
     """Read a mesh, a label volume or a cloud of points.
 
     Args:
         path: STL, PLY, OBJ, VTK, VTP or GLB; NIfTI or NRRD; or text of points (CSV, TXT, XYZ) with
             columns x, y, z.
-        label: which label of a volume; may be left out where there is only one.
+        label: which label of a volume, its number or its name; may be left out where there is only one.
 
     Raises:
         InputError: when the file cannot be used, or a volume has several labels and none is chosen.
@@ -135,19 +140,26 @@ def _cloud(points: NDArray[np.float64]) -> trimesh.Trimesh:
     return trimesh.Trimesh(points, np.zeros((0, 3), np.int64), process=False)
 
 
-def _from_labels(path: Path, volume: volumes.LabelVolume, label: int | None) -> Patient:
+def _from_labels(path: Path, volume: volumes.LabelVolume, label: int | str | None) -> Patient:
     sizes_cm3 = volumes.volumes_cm3(volume)
     if not sizes_cm3:
         raise InputError(f"{path.name} has no label; every voxel is 0, segment the scan first")
     listed = ", ".join(f"{_titled(volume, key)}: {size:.3g} cm3" for key, size in sizes_cm3.items())
     if label is None and len(sizes_cm3) > 1:
         raise InputError(f"{path.name} has {len(sizes_cm3)} labels ({listed}); choose one of them")
-    chosen = next(iter(sizes_cm3)) if label is None else label
+    chosen = next(iter(sizes_cm3)) if label is None else _numbered(volume, label)
     if chosen not in sizes_cm3:
-        raise InputError(f"{path.name} has no label {chosen}; it has {listed}")
+        raise InputError(f"{path.name} has no label {label}; it has {listed}")
     surface = volumes.label_surface(volume, chosen)
     remarks = (*volume.remarks, *_label_remarks(volume, chosen, surface, sizes_cm3[chosen]))
     return Patient(surface, f"{path.name}, label {_titled(volume, chosen)}", "LPS", remarks)
+
+
+def _numbered(volume: volumes.LabelVolume, label: int | str) -> int | None:
+    """The label that is meant by a number or a name; None where no label is called so."""
+    numbers = {name.casefold(): number for number, name in volume.names.items()}
+    text = str(label).strip()
+    return numbers.get(text.casefold(), int(text) if text.isdecimal() else None)
 
 
 def _titled(volume: volumes.LabelVolume, label: int) -> str:
@@ -228,7 +240,9 @@ def check_patient(patient: Patient, frame: Frame) -> tuple[Finding, ...]:
     """
     if fatal := _unusable(patient):
         return (fatal,)
-    found = [_units(patient, frame) or _position(patient, frame), _voxel_indices(patient), _space(patient)]
+    units = _units(patient, frame)
+    position = None if units and units.kind == "error" else _position(patient, frame)
+    found = [units, position, _voxel_indices(patient), _space(patient)]
     if len(patient.mesh_mm.faces) > MOST_FACES:
         found.append(_too_fine(patient))
     elif not patient.is_cloud:
@@ -286,11 +300,14 @@ def _units(patient: Patient, frame: Frame) -> Finding | None:
     if low <= longest / largest_mm <= high:
         return None
     sentence = f"the shape is {longest:.3g} mm long, the atlas's shapes are up to {largest_mm:.0f} mm"
-    for unit, factor in UNITS_MM.items():
+    for unit, factor in () if patient.units_known else UNITS_MM.items():
         if low <= longest * factor / largest_mm <= high:
             guess = f"{sentence}, so its numbers look like {unit}"
             return Finding("error", "units", guess, f"scale it by {factor:g}", partial(scaled, factor=factor))
-    return Finding("error", "units", sentence, "scale it to millimetres, or check that it is this anatomy")
+    # Of known units, a short shape may be a small part; nothing makes a long one right.
+    part = patient.units_known and longest < low * largest_mm
+    remedy = "scale it to millimetres, or check that it is this anatomy"
+    return Finding("warning" if part else "error", "units", sentence, remedy)
 
 
 def _voxel_indices(patient: Patient) -> Finding | None:
@@ -409,7 +426,7 @@ def moved(patient: Patient, transform: NDArray[np.float64]) -> Patient:
     """The patient after a 4x4 matrix, such as that of an accepted alignment."""
     mesh = patient.mesh_mm.copy()
     mesh.apply_transform(transform)
-    return replace(patient, mesh_mm=mesh)
+    return replace(patient, mesh_mm=mesh, from_file=transform @ patient.from_file)
 
 
 def scaled(patient: Patient, factor: ArrayLike) -> Patient:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,29 +13,25 @@ import trimesh
 from numpy.typing import NDArray
 
 from naisr_model.atlas import Atlas
-from naisr_model.config import FitConfig
 from naisr_model.covariates import Covariate, Population, normalised_vector
 from naisr_model.data.align import rigid_transform
 from naisr_model.data.populations import POPULATIONS, PopulationModule
 from naisr_model.data.populations import population as population_module
-from naisr_model.data.samples import ShapeSamples, sample_shape
 from naisr_model.data.store import SampleStore
 from naisr_model.errors import InputError
 from naisr_model.evaluation.metrics import compare, component_count, hausdorff_x100
 from naisr_model.evaluation.tables import TruthPoint, reconstruction_report
-from naisr_model.learning.fit import fit_latents
-from naisr_model.learning.objective import Batch
+from naisr_model.learning.fit import fit_shape
+from naisr_model.learning.prior import prior_of
+from naisr_model.learning.target import target_of
 from naisr_model.surface.folding import folded_shares
 
 Progress = Callable[[float], None]
 StopCheck = Callable[[], bool]
 
-SAMPLES_OF_A_FIT = 20_000
 NEIGHBOURS, NEIGHBOUR_DISTANCE = 3, 0.25
 EFFECT_VALUES = 9
 FOLDING_SHAPES, FOLDING_RESOLUTION = 40, 64
-FITTED_AT_ONCE = 4
-"""Shapes fitted together: their activations stay in the processor's cache."""
 
 
 @dataclass(frozen=True)
@@ -43,13 +39,11 @@ class EvaluationConfig:
     """What an evaluation costs.
 
     Attributes:
-        fit: how the codes of held-out shapes are found, their covariates being known.
         resolution: of the surfaces that are measured.
         check_resolution: of the many surfaces whose components are counted.
         limit: at most so many held-out shapes; 0 takes all.
     """
 
-    fit: FitConfig = field(default_factory=lambda: FitConfig(steps=200, surface_points=128, space_points=128))
     resolution: int = 192
     check_resolution: int = 96
     limit: int = 0
@@ -84,7 +78,7 @@ def evaluate(
     shapes = held_out_shapes(atlas, store, config.limit or None)
     if not shapes:
         raise InputError("no shape was held out, so nothing can be evaluated; prepare with --held-out 0.2")
-    latents = fit_all(atlas, shapes, config.fit, _part(progress, 0.0, 0.5), should_stop)
+    latents = fit_all(atlas, shapes, _part(progress, 0.0, 0.5), should_stop)
     distances, components = [], []
     for done, (shape, latent) in enumerate(zip(shapes, latents, strict=True), start=1):
         fitted = atlas.shape(
@@ -122,7 +116,7 @@ def held_out_shapes(atlas: Atlas, store: SampleStore | None, limit: int | None =
         _require_same_data(atlas, store)
         rows = np.flatnonzero(store.population.held_out)[:limit]
         return [HeldOut(store.population.row(int(row)), store.mesh(int(row))) for row in rows]
-    module = _synthetic(atlas)
+    module = synthetic(atlas)
     if module is None:
         raise InputError(
             "this atlas was made from data of your own; give the store it was trained on with --store"
@@ -131,7 +125,7 @@ def held_out_shapes(atlas: Atlas, store: SampleStore | None, limit: int | None =
     held_out = _held_out_visits(atlas.population)[:limit]
     visits = module.visits(int(source["seed"]), int(source["patients"]))
     return [
-        HeldOut(dict(visit.values), _aligned(atlas, *module.visit_shape(visit)))
+        HeldOut(dict(visit.values), aligned(atlas, *module.visit_shape(visit)))
         for visit in visits
         if (visit.subject, visit.visit) in held_out
     ]
@@ -156,16 +150,17 @@ def _held_out_visits(population: Population) -> list[tuple[str, str]]:
     return [(population.subjects[row], population.visits[row]) for row in rows]
 
 
-def _synthetic(atlas: Atlas) -> PopulationModule | None:
+def synthetic(atlas: Atlas) -> PopulationModule | None:
     """The population that an atlas records as its source and that can be made again."""
     source = atlas.checkpoint.source
     known = source.get("population") in POPULATIONS and {"seed", "patients"} <= set(source)
     return population_module(str(source["population"])) if known else None
 
 
-def _aligned(
+def aligned(
     atlas: Atlas, mesh: trimesh.Trimesh, landmarks: dict[str, tuple[float, float, float]]
 ) -> trimesh.Trimesh:
+    """A scan in millimetres and its landmarks, moved to the atlas frame as the training scans were."""
     moved = mesh.copy()
     moved.apply_transform(rigid_transform(atlas.checkpoint.alignment, mesh, landmarks))
     return moved
@@ -174,41 +169,18 @@ def _aligned(
 def fit_all(
     atlas: Atlas,
     shapes: Sequence[HeldOut],
-    config: FitConfig,
     progress: Progress | None = None,
     should_stop: StopCheck | None = None,
-) -> NDArray[np.float32]:
+) -> NDArray[np.float64]:
     """Codes of all shapes at their known covariates, ``[n, L]``."""
-    network, codes = atlas.checkpoint.network(), []
-    for start in range(0, len(shapes), FITTED_AT_ONCE):
-        chosen = shapes[start : start + FITTED_AT_ONCE]
-        samples = [
-            sample_shape(shape.mesh_mm, atlas.frame, *(SAMPLES_OF_A_FIT,) * 3, seed=config.seed)
-            for shape in chosen
-        ]
-        vectors = np.stack([normalised_vector(atlas.covariates, shape.values) for shape in chosen])
-        share = _part(progress, start / len(shapes), (start + len(chosen)) / len(shapes))
-        codes.append(
-            fit_latents(
-                network,
-                lambda rng, samples=samples: _draw(samples, config, rng),  # type: ignore[misc]
-                torch.as_tensor(vectors, dtype=torch.float32),
-                config,
-                atlas.checkpoint.preset.training.loss,
-                progress=share,
-                should_stop=should_stop,
-            ).numpy()
-        )
-    return np.concatenate(codes)
-
-
-def _draw(samples: Sequence[ShapeSamples], config: FitConfig, rng: np.random.Generator) -> Batch:
-    half = config.space_points // 2
-    picks = [rng.integers(0, SAMPLES_OF_A_FIT, count) for count in (config.surface_points, half, half)]
-    surface = np.stack([item.surface[picks[0]] for item in samples])
-    space = np.stack([np.concatenate([item.near[picks[1]], item.uniform[picks[2]]]) for item in samples])
-    dim = space.shape[-1] - 1
-    return Batch.from_arrays(surface[..., :dim], surface[..., dim:], space[..., :dim], space[..., dim])
+    network = atlas.checkpoint.network().requires_grad_(False)
+    prior, codes = prior_of(atlas.population, atlas.checkpoint.latents), []
+    for done, shape in enumerate(shapes, start=1):
+        target = target_of(shape.mesh_mm, atlas.frame)
+        known = normalised_vector(atlas.covariates, shape.values)
+        codes.append(fit_shape(network, target, prior, known, should_stop=should_stop)[0].latent)
+        _tell(progress, done / len(shapes))
+    return np.stack(codes)
 
 
 def truth_points(
@@ -222,7 +194,7 @@ def truth_points(
     Returns:
         Places along the growth path, places along each covariate, and the template.
     """
-    module = _synthetic(atlas)
+    module = synthetic(atlas)
     if module is None:
         return [], [], None
     growth, centre = module.growth_path(), atlas.population.centre
@@ -250,7 +222,7 @@ def _compared(
     should_stop: StopCheck | None = None,
 ) -> TruthPoint:
     """Phi(c, z = 0), which is Phi_i where only covariate i is off its centre, beside the true shape."""
-    truth = _aligned(atlas, module.true_shape(values), module.true_landmarks(values))
+    truth = aligned(atlas, module.true_shape(values), module.true_landmarks(values))
     shape = atlas.shape(values, resolution=resolution, extrapolate=True, should_stop=should_stop)
     return TruthPoint(
         covariate=covariate,

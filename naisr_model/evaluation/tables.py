@@ -183,7 +183,8 @@ def _place(point: TruthPoint) -> Record:
     return {**asdict(point), "volume_error": point.volume_error}
 
 
-def _table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+def markdown_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A Markdown table; the first column holds words, the others numbers."""
     lines = [header, ["---", *["---:"] * (len(header) - 1)], *rows]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
@@ -192,7 +193,7 @@ def _distance_table(report: Mapping[str, Any], published: Sequence[Published]) -
     measured = [_pair(report[name]["mean"], report[name]["median"]) for name in COLUMNS]
     rows = [[f"this atlas, {report['n']} held-out shapes, covariates given", *measured]]
     rows += [[f"published: {row.label}", *_published_cells(row)] for row in published]
-    return "**Reconstruction, mean / median**\n\n" + _table(["", *COLUMNS.values()], rows)
+    return "**Reconstruction, mean / median**\n\n" + markdown_table(["", *COLUMNS.values()], rows)
 
 
 def _published_cells(row: Published) -> list[str]:
@@ -221,7 +222,7 @@ def _truth_table(title: str, places: Sequence[Mapping[str, Any]]) -> str:
         ]
         for place in places
     ]
-    return f"**{title}**\n\n" + _table(header, rows)
+    return f"**{title}**\n\n" + markdown_table(header, rows)
 
 
 def _checks(report: Mapping[str, Any]) -> str:

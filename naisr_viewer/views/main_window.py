@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QAction,
     QActionGroup,
@@ -17,6 +17,7 @@ from PySide6.QtGui import (
     QGuiApplication,
     QImage,
     QKeySequence,
+    QPaintEvent,
 )
 from PySide6.QtWidgets import (
     QApplication,
@@ -59,6 +60,7 @@ class MainWindow(QMainWindow):
     cancel_requested = Signal()  # the cancel button beside the progress bar
     about_requested = Signal()  # Help > About
     closing = Signal()  # the window is about to close
+    appeared = Signal()  # the window has just been painted for the first time
 
     def __init__(self) -> None:
         super().__init__()
@@ -66,6 +68,7 @@ class MainWindow(QMainWindow):
         self.resize(FIRST_SIZE)
         self.setAcceptDrops(True)
         self._theme_choice = ThemeChoice.SYSTEM
+        self._has_appeared = False
         self.covariates = CovariatePanel(self)
         self.shapes = ShapeView(self)
         self._state = ExplorerState()
@@ -153,10 +156,17 @@ class MainWindow(QMainWindow):
         return self.grab().toImage()
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Let the controller stop its work, then release the render window."""
+        """Let the controller stop its work, then release what draws the shapes."""
         self.closing.emit()
         self.shapes.clear()
         super().closeEvent(event)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Tell when the window is on the screen, so that what takes long can start behind it."""
+        super().paintEvent(event)
+        if not self._has_appeared:
+            self._has_appeared = True
+            QTimer.singleShot(0, self, self.appeared.emit)
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         """Take files."""

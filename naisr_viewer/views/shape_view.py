@@ -1,21 +1,26 @@
-"""The centre: linked sub-plots that share one camera. The only user of pyvistaqt."""
+"""The centre: linked sub-plots that share one camera, drawn by a canvas and labelled by Qt."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from importlib import import_module
+from threading import Thread
+from typing import TYPE_CHECKING
 
-import numpy as np
-import pyvista as pv
-from numpy.typing import NDArray
 from PySide6.QtCore import QRect, Qt, Signal
-from PySide6.QtGui import QImage, QResizeEvent
+from PySide6.QtGui import QImage, QResizeEvent, QSurfaceFormat
+from PySide6.QtOpenGLWidgets import QOpenGLWidget
 from PySide6.QtWidgets import QFrame, QLabel, QVBoxLayout, QWidget
-from pyvistaqt import QtInteractor
 
 from naisr_viewer.requests import SurfaceResult
 from naisr_viewer.state import AtlasCard, Panel, all_panels, panel_title
-from naisr_viewer.views.theme import Theme, panel_colour
+from naisr_viewer.views.theme import LIGHT, Theme, panel_colour
+
+if TYPE_CHECKING:
+    from naisr_viewer.views.canvas import Canvas, Viewport
 
 ROOM = 1.25
 """A shape is framed with this much room, so that it can grow while a slider moves."""
@@ -24,8 +29,8 @@ TITLE_PX = 36
 CAPTION_PX = 52
 """Strips above and beneath each shape, kept free for words."""
 
-REST_SAMPLES = 4
-"""Multi-sampling at rest; none while dragging, where it costs two thirds of a frame."""
+DRAWING = "naisr_viewer.views.canvas"
+"""The module that draws; loaded behind the window, because VTK takes a while."""
 
 HINTS = {
     "template": "The shape from which all others are made.",
@@ -80,69 +85,10 @@ def drawn_height(area: QRect) -> int:
     return max(area.height() - TITLE_PX - CAPTION_PX, 1)
 
 
-def as_polydata(result: SurfaceResult) -> pv.PolyData:
-    """The surface with its normals."""
-    if len(result.faces) == 0:
-        return pv.PolyData()
-    mesh = pv.PolyData.from_regular_faces(result.points_mm, result.faces)
-    mesh.point_data.active_normals = result.normals
-    return mesh
-
-
-def aim(camera: pv.Camera, box_mm: NDArray[np.float64]) -> None:
-    """Look at the middle of a box ``[3, 2]`` from well outside, keeping the direction."""
-    direction = np.subtract(camera.position, camera.focal_point)
-    distance = 3 * np.linalg.norm(box_mm[:, 1] - box_mm[:, 0])
-    centre = box_mm.mean(axis=1)
-    camera.position = centre + direction / np.linalg.norm(direction) * distance
-    camera.focal_point = centre
-
-
-def seen_size(camera: pv.Camera, box_mm: NDArray[np.float64]) -> tuple[float, float]:
-    """Width and height in millimetres of a box ``[3, 2]`` as the camera sees it."""
-    forward = np.subtract(camera.focal_point, camera.position)
-    right = np.cross(forward, camera.up)
-    right /= np.linalg.norm(right)
-    up = np.cross(right, forward / np.linalg.norm(forward))
-    size = box_mm[:, 1] - box_mm[:, 0]
-    return float(np.abs(right) @ size), float(np.abs(up) @ size)
-
-
-class Canvas(QtInteractor):
-    """An interactor that draws once per change, when Qt asks it to paint."""
-
-    def __init__(self, panels: int, parent: QWidget) -> None:
-        super().__init__(
-            parent, shape=(1, panels), border=False, auto_update=False, multi_samples=REST_SAMPLES
-        )
-        self.setAcceptDrops(False)
-        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.bounds_mm: tuple[float, ...] | None = None
-        self._requests = self.iren.interactor.AddObserver("RenderEvent", self._render_requested)
-        self.iren.interactor.EnableRenderOff()
-
-    drawn = Signal()  # the scene has just been drawn
-
-    def paintGL(self) -> None:
-        """Draw; the only place where anything is drawn."""
-        if self._closed:
-            return
-        if self.bounds_mm is not None:
-            self.renderers[0].ResetCameraClippingRange(self.bounds_mm)
-        self.iren.interactor.EnableRenderOn()
-        super().paintGL()
-        self.iren.interactor.EnableRenderOff()
-        self.drawn.emit()
-
-    def release(self) -> None:
-        """Close the render window for good; nothing is drawn afterwards."""
-        self.iren.interactor.RemoveObserver(self._requests)
-        self.close()
-        self.deleteLater()
-
-    def _render_requested(self, _interactor: object, _event: str) -> None:
-        if not self._in_paint:
-            self.update()
+def separators(areas: Sequence[QRect]) -> set[tuple[int, int, int, int]]:
+    """Left, top, width and height of the lines between sub-plots."""
+    beside = {(area.left(), area.top(), 1, area.height()) for area in areas if area.left() > 0}
+    return beside | {(area.left(), area.top(), area.width(), 1) for area in areas if area.top() > 0}
 
 
 @dataclass(eq=False)
@@ -150,55 +96,81 @@ class Cell:
     """One sub-plot on screen.
 
     Attributes:
-        panel: what it shows.
-        mesh: the drawn surface; its contents are replaced in place.
         title: the label above.
         volume: the label beneath.
+        result: the surface, or None as long as there is none.
     """
 
-    panel: Panel
-    mesh: pv.PolyData
     title: QLabel
     volume: QLabel
+    result: SurfaceResult | None = None
+
+    @property
+    def has_surface(self) -> bool:
+        """Whether there is anything to see."""
+        return self.result is not None and len(self.result.faces) > 0
 
 
 class ShapeView(QWidget):
     """Template, effects and full shape, seen through one camera."""
 
     scale_changed = Signal(float)  # pixels per millimetre, after zooming or resizing
+    drawn = Signal(int)  # the picture is on its way to the screen; how many sub-plots were drawn anew
+
+    _drawing_loaded = Signal()  # from the thread that imports: the drawing library has arrived
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("canvasArea")
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        # A window of its own: Qt puts everything in a window with an OpenGL widget together by OpenGL, and
+        # a moving slider beside it would have all of it put together once more.
+        self.setAttribute(Qt.WidgetAttribute.WA_DontCreateNativeAncestors)
+        self.setAttribute(Qt.WidgetAttribute.WA_NativeWindow)
+        self._reserve_opengl()
         self._canvas: Canvas | None = None
+        self._make_canvas: type[Canvas] | None = None
+        self._loading: Thread | None = None
+        self._theme = LIGHT
+        self._atlas: AtlasCard | None = None
         self._cells: dict[Panel, Cell] = {}
         self._visible: tuple[Panel, ...] = ()
         self._separators: list[QFrame] = []
+        self._direction = OBLIQUE
         self._framed = False
+        self._moving = self._held = False
         self._seen_mm = (1.0, 1.5)
         self._fit_scale = 1.0
         self._drawn_height = 1
         self._pixels_per_mm = 0.0
         self._area = QVBoxLayout(self)
         self._area.setContentsMargins(0, 0, 0, 0)
+        self._drawing_loaded.connect(self._start_drawing, Qt.ConnectionType.QueuedConnection)
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether surfaces are drawn as soon as they are shown."""
+        return self._make_canvas is not None
+
+    def prepare(self) -> None:
+        """Load what draws the shapes, beside the window where that takes time."""
+        if self._make_canvas is not None or self._loading is not None:
+            return
+        if DRAWING in sys.modules:
+            self._start_drawing()
+        else:
+            self._loading = Thread(target=self._load, name="naisr-drawing", daemon=True)
+            self._loading.start()
 
     def show_atlas(self, atlas: AtlasCard, theme: Theme) -> None:
         """Make one sub-plot per panel of ``atlas``, still without surfaces."""
-        self.clear()
-        panels = all_panels(atlas)
-        self._canvas = Canvas(len(panels), self)
-        self._canvas.drawn.connect(self._tell_scale)
-        self._area.addWidget(self._canvas)
-        self._cells = {
-            panel: self._make_cell(index, panel, panel_colour(atlas, panel))
-            for index, panel in enumerate(panels)
-        }
-        self._canvas.link_views()
-        self._canvas.enable_parallel_projection()
-        self._look(*OBLIQUE)
-        self._framed = False
-        self.set_theme(theme)
+        self.prepare()
+        self._remove_cells()
+        self._atlas = atlas
+        self._cells = {panel: self._make_cell(panel, atlas) for panel in all_panels(atlas)}
+        self._direction = OBLIQUE
+        self._theme = theme
+        self._open_canvas()
 
     def show_panels(self, panels: Sequence[Panel]) -> None:
         """Put these sub-plots on screen and hide the others."""
@@ -207,15 +179,12 @@ class ShapeView(QWidget):
             self._arrange()
 
     def show_surface(self, result: SurfaceResult) -> None:
-        """Replace one surface in place."""
-        cell = self._cells[result.request.panel]
-        cell.mesh.copy_from(as_polydata(result), deep=False)
+        """Replace one surface in place; all that are replaced before Qt paints again share one painting."""
+        panel = result.request.panel
+        self._cells[panel].result = result
         if self._canvas is not None:
-            self._canvas.bounds_mm = self._bounds()
-            if not self._framed:
-                self.reset_camera()
-                self._framed = all(self._cells[panel].mesh.n_points for panel in self._visible)
-            self._canvas.update()
+            self._canvas.set_surface(list(self._cells).index(panel), result)
+            self._frame_once(self._canvas)
 
     def set_caption(self, panel: Panel, text: str, hint: str) -> None:
         """The line beneath a sub-plot, and more about it on hover."""
@@ -232,36 +201,29 @@ class ShapeView(QWidget):
 
     def set_moving(self, moving: bool) -> None:
         """Draw quickly while a slider moves, smoothly at rest."""
-        if self._canvas is None:
-            return
-        samples = 0 if moving else REST_SAMPLES
-        if self._canvas.ren_win.GetMultiSamples() != samples:
-            self._canvas.ren_win.SetMultiSamples(samples)
-            self._canvas.update()
+        self._moving = moving
+        self._choose_quality()
 
     def set_theme(self, theme: Theme) -> None:
         """Follow the theme."""
+        self._theme = theme
         if self._canvas is not None:
-            for renderer in self._canvas.renderers:
-                renderer.set_background(theme.canvas)
-            self._canvas.update()
+            self._canvas.set_background(theme.canvas)
 
     def reset_camera(self) -> None:
         """Frame what is on screen, keeping the direction."""
-        bounds_mm = self._bounds()
-        if self._canvas is None or bounds_mm is None:
+        box_mm = None if self._canvas is None else self._canvas.box_mm()
+        if self._canvas is None or box_mm is None:
             return
-        box = np.reshape(bounds_mm, (3, 2))
-        aim(self._canvas.camera, box)
-        self._seen_mm = seen_size(self._canvas.camera, box)
+        self._seen_mm = self._canvas.frame(box_mm)
         self._arrange()
         self._canvas.camera.parallel_scale = self._fit_scale
-        self._canvas.update()
 
     def look_from(self, direction: str) -> None:
         """Stand at one of :data:`DIRECTIONS` and frame what is on screen."""
+        self._direction = DIRECTIONS[direction]
         if self._canvas is not None:
-            self._look(*DIRECTIONS[direction])
+            self._canvas.look(*self._direction)
             self.reset_camera()
 
     def grab_image(self) -> QImage:
@@ -269,31 +231,90 @@ class ShapeView(QWidget):
         return self.grab().toImage()
 
     def clear(self) -> None:
-        """Release the render window and all labels."""
-        for cell in self._cells.values():
-            cell.title.deleteLater()
-            cell.volume.deleteLater()
-        for line in self._separators:
-            line.deleteLater()
-        self._cells, self._separators, self._visible = {}, [], ()
-        if self._canvas is not None:
-            self._area.removeWidget(self._canvas)
-            self._canvas.release()
-            self._canvas = None
+        """Release the render window and all labels; nothing is drawn afterwards."""
+        self._remove_cells()
+        if self._loading is not None:
+            self._loading.join()
+        self._drawing_loaded.disconnect(self._start_drawing)
+        self._close_canvas()
+        self._make_canvas = self._atlas = None  # what was loaded may still be on its way here
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Rearrange for the new size."""
         super().resizeEvent(event)
         self._arrange()
 
-    def _make_cell(self, index: int, panel: Panel, colour: str) -> Cell:
-        assert self._canvas is not None
-        mesh = pv.PolyData()
-        self._canvas.subplot(0, index)
-        actor = self._canvas.add_actor(pv.Actor(mapper=pv.DataSetMapper(mesh)), render=False)[0]
-        prop = actor.prop
-        prop.color, prop.interpolation = colour, "Phong"
-        prop.ambient, prop.diffuse, prop.specular, prop.specular_power = 0.25, 0.9, 0.2, 25
+    def _reserve_opengl(self) -> None:
+        """Have the window made for OpenGL; else Qt makes it anew, visibly, when the canvas is added."""
+        wanted = QSurfaceFormat()
+        wanted.setRenderableType(QSurfaceFormat.RenderableType.OpenGL)
+        wanted.setProfile(QSurfaceFormat.OpenGLContextProfile.CoreProfile)
+        wanted.setVersion(3, 2)  # the least that VTK draws with
+        wanted.setAlphaBufferSize(8)
+        QSurfaceFormat.setDefaultFormat(wanted)
+        QOpenGLWidget(self).hide()
+
+    def _load(self) -> None:
+        """In a thread of its own; an error is met again, and told, when the canvas is opened."""
+        with suppress(ImportError):
+            import_module(DRAWING)
+        self._drawing_loaded.emit()
+
+    def _start_drawing(self) -> None:
+        self._make_canvas = import_module(DRAWING).Canvas
+        self._open_canvas()
+
+    def _open_canvas(self) -> None:
+        """Start drawing anew, with all that was shown before."""
+        self._close_canvas()
+        if self._make_canvas is None or self._atlas is None:
+            return
+        colours = [panel_colour(self._atlas, panel) for panel in self._cells]
+        self._canvas = self._make_canvas(colours, self)
+        self._canvas.drawn.connect(self._tell_drawn)
+        self._canvas.held.connect(self._set_held)
+        self._area.addWidget(self._canvas)
+        self._canvas.show()  # the layout would only do so with the next turn of the event loop
+        self._canvas.look(*self._direction)
+        self._framed, self._held = False, False
+        self.set_theme(self._theme)
+        self._choose_quality()
+        for index, cell in enumerate(self._cells.values()):
+            if cell.result is not None:
+                self._canvas.set_surface(index, cell.result)
+        self._arrange()
+        self._frame_once(self._canvas)
+
+    def _close_canvas(self) -> None:
+        if self._canvas is not None:
+            self._area.removeWidget(self._canvas)
+            self._canvas.release()
+            self._canvas = None
+
+    def _frame_once(self, canvas: Canvas) -> None:
+        """Frame the first surfaces; afterwards the camera is the user's."""
+        if not self._framed and canvas.box_mm() is not None:
+            self.reset_camera()
+            self._framed = all(self._cells[panel].has_surface for panel in self._visible)
+
+    def _choose_quality(self) -> None:
+        if self._canvas is not None:
+            self._canvas.set_smooth(not self._moving and not self._held)
+
+    def _set_held(self, held: bool) -> None:
+        self._held = held
+        self._choose_quality()
+
+    def _remove_cells(self) -> None:
+        for cell in self._cells.values():
+            cell.title.deleteLater()
+            cell.volume.deleteLater()
+        for line in self._separators:
+            line.deleteLater()
+        self._cells, self._separators, self._visible = {}, [], ()
+
+    def _make_cell(self, panel: Panel, atlas: AtlasCard) -> Cell:
+        colour = panel_colour(atlas, panel)
         title = QLabel(f'<span style="color:{colour}">●</span>&nbsp;{panel_title(panel)}', self)
         title.setObjectName("panelTitle")
         title.setToolTip(HINTS[panel.kind])
@@ -301,61 +322,46 @@ class ShapeView(QWidget):
         volume = QLabel(self)
         volume.setObjectName("volume")
         volume.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
-        return Cell(panel, mesh, title, volume)
-
-    def _bounds(self) -> tuple[float, ...] | None:
-        """Bounds of all visible surfaces in millimetres."""
-        boxes = [self._cells[p].mesh.bounds for p in self._visible if self._cells[p].mesh.n_points]
-        if not boxes:
-            return None
-        lower, upper = np.min(boxes, axis=0)[::2], np.max(boxes, axis=0)[1::2]
-        return tuple(map(float, np.stack([lower, upper], axis=1).ravel()))
-
-    def _look(self, direction: tuple[float, float, float], up: tuple[float, float, float]) -> None:
-        assert self._canvas is not None
-        camera = self._canvas.camera
-        camera.focal_point, camera.position, camera.up = (0, 0, 0), direction, up
+        return Cell(title, volume)
 
     def _arrange(self) -> None:
         """Divide the canvas among the visible panels, keeping the user's zoom."""
-        if self._canvas is None or not self._visible or not self.width() or not self.height():
+        if not self._visible or not self.width() or not self.height():
             return
         wide, high = self._seen_mm
         columns = columns_for(len(self._visible), self.width() / self.height(), wide / high)
         places = map(self._pixels, cells(len(self._visible), columns))
         areas = dict(zip(self._visible, places, strict=True))
-        for panel, renderer in zip(self._cells, self._canvas.renderers, strict=True):
-            renderer.SetDraw(panel in areas)
-            renderer.SetInteractive(panel in areas)
-            if panel in areas:
-                self._set_viewport(renderer, areas[panel])
-        zoom = self._canvas.camera.parallel_scale / self._fit_scale
-        self._drawn_height = drawn_height(areas[self._visible[0]])
-        self._fit_scale = self._scale_to_fit(areas[self._visible[0]], wide, high)
-        self._canvas.camera.parallel_scale = zoom * self._fit_scale
+        first = areas[self._visible[0]]
+        self._drawn_height = drawn_height(first)
+        old_fit, self._fit_scale = self._fit_scale, self._scale_to_fit(first, wide, high)
+        if self._canvas is not None:
+            self._canvas.camera.parallel_scale *= self._fit_scale / old_fit
+            self._canvas.set_viewports(
+                [self._viewport(areas[panel]) if panel in areas else None for panel in self._cells]
+            )
         self._place_labels(areas)
         self._place_separators(areas)
-        self._canvas.update()
 
-    def _tell_scale(self) -> None:
-        if self._canvas is None or not self._framed:
-            return
-        scale = self._drawn_height / (2 * self._canvas.camera.parallel_scale)
-        if scale != self._pixels_per_mm:
-            self._pixels_per_mm = scale
-            self.scale_changed.emit(scale)
+    def _tell_drawn(self, count: int) -> None:
+        if self._canvas is not None and self._framed:
+            scale = self._drawn_height / (2 * self._canvas.camera.parallel_scale)
+            if scale != self._pixels_per_mm:
+                self._pixels_per_mm = scale
+                self.scale_changed.emit(scale)
+        self.drawn.emit(count)
 
     def _scale_to_fit(self, area: QRect, wide: float, high: float) -> float:
         """Millimetres from the middle to the top of a sub-plot in which the framed box fits."""
         height = drawn_height(area)
         return ROOM * max(high, wide * height / area.width()) / 2
 
-    def _set_viewport(self, renderer: pv.Renderer, area: QRect) -> None:
-        """Draw inside ``area``, between its title and its caption."""
+    def _viewport(self, area: QRect) -> Viewport:
+        """Where the shape is drawn inside ``area``, between its title and its caption."""
         top = area.top() + TITLE_PX
         bottom = top + drawn_height(area)
         left, right = area.left() / self.width(), (area.left() + area.width()) / self.width()
-        renderer.SetViewport(left, 1 - bottom / self.height(), right, 1 - top / self.height())
+        return left, 1 - bottom / self.height(), right, 1 - top / self.height()
 
     def _pixels(self, place: tuple[float, float, float, float]) -> QRect:
         left, top = round(place[0] * self.width()), round(place[1] * self.height())
@@ -377,12 +383,10 @@ class ShapeView(QWidget):
     def _place_separators(self, areas: dict[Panel, QRect]) -> None:
         for line in self._separators:
             line.deleteLater()
-        edges = {QRect(r.left(), r.top(), 1, r.height()) for r in areas.values() if r.left() > 0}
-        edges |= {QRect(r.left(), r.top(), r.width(), 1) for r in areas.values() if r.top() > 0}
         self._separators = []
-        for edge in edges:
+        for edge in separators(list(areas.values())):
             line = QFrame(self)
             line.setObjectName("separator")
-            line.setGeometry(edge)
+            line.setGeometry(*edge)
             line.show()
             self._separators.append(line)

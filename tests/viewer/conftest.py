@@ -16,6 +16,8 @@ from pytestqt.qtbot import QtBot
 from naisr_model.covariates import Covariate, Population
 from naisr_model.errors import Cancelled, InputError
 from naisr_model.frames import Frame
+from naisr_model.surface.displacements import DisplacementTables
+from naisr_model.surface.tracking import Tracked
 from naisr_viewer.controller import Controller
 from naisr_viewer.engine import Engine
 from naisr_viewer.state import AtlasCard
@@ -41,6 +43,21 @@ def people(count: int = 200) -> Population:
         values=np.stack([age, weight, sex], axis=1),
         held_out=np.arange(count) % 5 == 0,
     )
+
+
+class EllipsoidTracker:
+    """Scales the template's vertices; what is older than 200 months counts as folded."""
+
+    def __init__(self, template: trimesh.Trimesh) -> None:
+        self.template = template
+        self.faces = np.asarray(template.faces, np.int64)
+
+    def track(self, values, start=None):
+        ratio = np.divide(EllipsoidAtlas.half_axes_mm(**values), EllipsoidAtlas.half_axes_mm())
+        normals = self.template.vertex_normals / ratio
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        points_mm = (self.template.vertices * ratio).astype(np.float32)
+        return Tracked(points_mm, normals.astype(np.float32), 0.0, values.get("age", 0.0) > 200)
 
 
 class EllipsoidAtlas:
@@ -82,6 +99,16 @@ class EllipsoidAtlas:
     ):
         return self._surface("shape", dict(covariates), resolution, progress, should_stop)
 
+    def tabulate(self, template, latent=None, *, progress=None, should_stop=None):
+        """Nothing needs to be tabulated: the tracker knows the ellipsoids."""
+        self.calls.append(("tabulate", {}, 0))
+        if should_stop is not None and should_stop():
+            raise Cancelled
+        return DisplacementTables(np.zeros((2, 3)), ())
+
+    def tracker(self, template, tables):
+        return EllipsoidTracker(template)
+
     def _surface(self, what, values, resolution, progress, should_stop):
         self.calls.append((what, values, resolution))
         self.running += 1
@@ -100,6 +127,12 @@ class EllipsoidAtlas:
         return mesh
 
 
+@pytest.fixture(autouse=True)
+def no_traces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Keep tabulated displacements out of the cache of whoever runs the tests."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "user-cache"))
+
+
 @pytest.fixture
 def atlas() -> EllipsoidAtlas:
     return EllipsoidAtlas()
@@ -114,13 +147,13 @@ def atlas_file(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def engine(atlas: EllipsoidAtlas) -> Engine:
+def engine(atlas: EllipsoidAtlas, tmp_path: Path) -> Engine:
     def load(path: Path):
         if path.read_bytes() != b"stand-in":
             raise InputError(f"{path.name} is not an atlas file; choose a .safetensors made by 'naisr train'")
         return atlas
 
-    return Engine(load)
+    return Engine(load, tmp_path / "cache")
 
 
 @pytest.fixture
@@ -142,7 +175,7 @@ def open_window(
 
     def make(size: tuple[int, int] = (960, 640)) -> tuple[MainWindow, Controller]:
         window = MainWindow()
-        controller = Controller(window, engine, Worker(), settings)
+        controller = Controller(window, engine, Worker(), Worker(), settings)
         made.append((window, controller))
         window.resize(*size)
         window.show()

@@ -142,7 +142,7 @@ def no_display(monkeypatch) -> None:
 
 def test_without_display_a_window_for_a_person_is_refused_in_words(no_display, capsys, atlas_file):
     assert app.main([str(atlas_file)]) == 2
-    assert "--screenshot or --demo" in capsys.readouterr().err
+    assert "--screenshot, --demo or --measure" in capsys.readouterr().err
 
 
 def test_without_display_and_xvfb_the_remedy_is_named(

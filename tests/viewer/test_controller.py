@@ -13,7 +13,7 @@ from PySide6.QtGui import QImage
 from naisr_model import __version__
 from naisr_model.errors import InputError
 from naisr_viewer.controller import Controller, in_words
-from naisr_viewer.requests import EXACT_RESOLUTION, PREVIEW_RESOLUTION, ExportChoice, SurfaceResult
+from naisr_viewer.requests import EXACT_RESOLUTION, PREVIEW_RESOLUTION, ExportChoice, Origin, SurfaceResult
 from naisr_viewer.state import FULL_SHAPE, TEMPLATE, Layout, Panel, all_panels
 from naisr_viewer.views.covariate_panel import CovariatePanel
 from naisr_viewer.views.main_window import MainWindow
@@ -62,7 +62,7 @@ def window(qapp: QObject) -> Mock:
 
 @pytest.fixture
 def controller(window, engine, settings) -> Controller:
-    return Controller(window, engine, Worker(synchronous=True), settings)
+    return Controller(window, engine, Worker(synchronous=True), Worker(synchronous=True), settings)
 
 
 @pytest.fixture
@@ -90,21 +90,56 @@ def test_opening_shows_coarse_surfaces_first_and_exact_ones_at_last(controller, 
     assert not controller.is_busy
 
 
-def test_dragging_age_computes_only_what_age_changes_and_only_coarsely(ready, window, atlas):
+def test_dragging_age_carries_only_what_age_changes_and_asks_no_network(ready, window, atlas):
     window.covariates.value_settled.emit("sex", 1.0)
     atlas.calls.clear()
+    window.shapes.show_surface.reset_mock()
     for value in (110.0, 120.0, 130.0):
         window.covariates.value_moved.emit("age", value)
-    assert {what for what, _, _ in atlas.calls} == {"age", "shape"}
-    assert {size for _, _, size in atlas.calls} == {PREVIEW_RESOLUTION}
-    assert status(window).startswith(f"Preview {PREVIEW_RESOLUTION}³")
-    atlas.calls.clear()
+    assert atlas.calls == []
+    assert {result.request.panel for result in drawn(window)} == {AGE_ONLY, FULL_SHAPE}
+    assert {result.origin for result in drawn(window)} == {Origin.TABLES}
+    assert len({id(result.faces) for result in drawn(window)}) == 1
+    assert status(window).startswith("Preview in ")
+    assert ready.shown[AGE_ONLY].volume_cm3 == pytest.approx(atlas.volume_cm3(age=130.0), rel=0.01)
     window.covariates.value_settled.emit("age", 130.0)
     assert [(what, size) for what, _, size in atlas.calls] == [
         ("shape", EXACT_RESOLUTION),
         ("age", EXACT_RESOLUTION),
     ]
     assert status(window).startswith(f"Exact {EXACT_RESOLUTION}³")
+
+
+def test_after_a_drag_the_status_line_says_how_far_off_the_preview_was(ready, window):
+    window.covariates.value_moved.emit("age", 130.0)
+    window.covariates.value_settled.emit("age", 130.0)
+    assert "99 % of the preview was within 0.01 mm" in status(window)
+
+
+def test_a_preview_that_folds_is_marked_until_the_exact_surface_is_there(ready, window):
+    window.covariates.value_moved.emit("age", 210.0)
+    assert "preview uncertain" in window.shapes.set_caption.call_args.args[1]
+    window.covariates.value_settled.emit("age", 210.0)
+    captions = {call.args[0]: call.args[1] for call in window.shapes.set_caption.call_args_list}
+    assert "preview uncertain" not in captions[AGE_ONLY]
+
+
+def test_dragging_works_coarsely_until_displacements_are_tabulated(held, window, atlas):
+    controller, worker = held
+    window.covariates.value_moved.emit("age", 130.0)
+    worker.run()
+    assert controller.shown[AGE_ONLY].origin is Origin.NETWORK
+    assert status(window).startswith(f"Preview {PREVIEW_RESOLUTION}³")
+
+
+def test_what_fails_in_the_background_is_told_and_dragging_stays_coarse(
+    controller, window, atlas, atlas_file, monkeypatch
+):
+    monkeypatch.setattr(atlas, "tabulate", Mock(side_effect=MemoryError("no room")))
+    controller.open(atlas_file)
+    assert "Previews stay coarse" in window.show_error.call_args.args[0]
+    window.covariates.value_moved.emit("age", 130.0)
+    assert controller.shown[AGE_ONLY].origin is Origin.NETWORK
 
 
 def test_the_volume_beneath_a_shape_is_that_of_the_shape(ready, window, atlas):
@@ -223,7 +258,7 @@ def test_recent_files_and_theme_are_remembered(
     window.theme_requested.emit(ThemeChoice.DARK)
     settings.sync()
     again = QSettings(settings.fileName(), QSettings.Format.IniFormat)
-    Controller(window, engine, Worker(synchronous=True), again)
+    Controller(window, engine, Worker(synchronous=True), Worker(synchronous=True), again)
     window.show_recent.assert_called_with([atlas_file])
     window.show_theme.assert_called_with(ThemeChoice.DARK)
 
@@ -260,7 +295,7 @@ class HeldWorker(QObject):
 @pytest.fixture
 def held(window, engine, settings, card) -> tuple[Controller, HeldWorker]:
     worker = HeldWorker()
-    controller = Controller(window, engine, worker, settings)  # type: ignore[arg-type]
+    controller = Controller(window, engine, worker, HeldWorker(), settings)  # type: ignore[arg-type]
     controller.show_atlas(card)
     while worker.job is not None:
         worker.run()
@@ -294,7 +329,7 @@ def test_a_result_for_values_left_behind_is_not_shown_at_rest(held, window, engi
     window.covariates.value_moved.emit("age", 120.0)
     late = engine.surface(controller._request(AGE_ONLY, PREVIEW_RESOLUTION))
     window.covariates.value_settled.emit("age", 90.0)
-    worker.delivered.emit(late)
+    worker.delivered.emit((late,))
     assert controller.shown[AGE_ONLY].request.values != (("age", 120.0),)
     while worker.job is not None:
         worker.run()

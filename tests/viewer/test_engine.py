@@ -13,7 +13,7 @@ from naisr_model.atlas import Atlas
 from naisr_model.errors import Cancelled, InputError
 from naisr_model.frames import Frame
 from naisr_viewer.engine import CACHED_SURFACES, Engine
-from naisr_viewer.requests import SurfaceRequest, answers
+from naisr_viewer.requests import Origin, SurfaceRequest, answers
 from naisr_viewer.state import FULL_SHAPE, TEMPLATE, Panel
 
 
@@ -21,7 +21,7 @@ def ask(path: Path, panel: Panel = FULL_SHAPE, resolution: int = 128, **values: 
     return SurfaceRequest(path, panel, tuple(values.items()), resolution)
 
 
-@pytest.mark.parametrize("method", ["shape", "effect", "template"])
+@pytest.mark.parametrize("method", ["shape", "effect", "template", "tabulate", "tracker"])
 def test_the_stand_in_is_called_like_the_real_atlas(atlas, method):
     real, stand_in = (inspect.signature(getattr(kind, method)) for kind in (Atlas, type(atlas)))
     assert list(stand_in.parameters) == list(real.parameters)
@@ -118,3 +118,71 @@ def test_a_finer_surface_answers_a_coarser_question(engine, card):
     assert not answers(fine, ask(card.path, resolution=256, age=50.0))
     assert not answers(fine, ask(card.path, resolution=40, age=51.0))
     assert not answers(None, ask(card.path))
+
+
+def tabulations(atlas) -> int:
+    return [what for what, _, _ in atlas.calls].count("tabulate")
+
+
+def test_previews_carry_the_template_once_displacements_are_tabulated(engine, card, atlas):
+    assert not engine.has_previews(card.path)
+    engine.prepare_previews(card.path)
+    assert engine.has_previews(card.path)
+    template = engine.surface(ask(card.path, TEMPLATE))
+    atlas.calls.clear()
+    first = engine.surface(ask(card.path, resolution=40, age=150.0, weight=50.0))
+    second = engine.surface(ask(card.path, resolution=40, age=151.0, weight=50.0))
+    assert atlas.calls == []
+    assert first.faces is second.faces
+    np.testing.assert_array_equal(first.faces, template.faces)
+    assert first.volume_cm3 == pytest.approx(atlas.volume_cm3(age=150.0, weight=50.0), rel=0.01)
+    assert not first.is_exact
+    assert first.origin is Origin.TABLES
+
+
+def test_an_exact_surface_tells_how_far_off_its_preview_was(engine, card):
+    assert engine.surface(ask(card.path, age=50.0)).preview_error_mm is None
+    engine.prepare_previews(card.path)
+    exact = engine.surface(ask(card.path, age=60.0))
+    assert exact.preview_error_mm == pytest.approx(0.0, abs=1e-3)
+
+
+def test_tables_are_read_from_the_disk_the_next_time(engine, card, atlas, tmp_path):
+    engine.prepare_previews(card.path)
+    again = Engine(lambda _: atlas, tmp_path / "cache")
+    again.open(card.path)
+    again.prepare_previews(card.path)
+    assert tabulations(atlas) == 1
+
+
+def test_tables_of_a_file_with_other_contents_are_made_anew(engine, card, atlas, tmp_path):
+    engine.prepare_previews(card.path)
+    card.path.write_bytes(b"trained on")
+    again = Engine(lambda _: atlas, tmp_path / "cache")
+    again.open(card.path)
+    again.prepare_previews(card.path)
+    assert tabulations(atlas) == 2
+
+
+@pytest.mark.parametrize("damage", ["truncated", "no folder"])
+def test_a_broken_cache_costs_time_and_no_more(engine, card, atlas, tmp_path, damage):
+    if damage == "truncated":
+        engine.prepare_previews(card.path)
+        (file,) = (tmp_path / "cache").iterdir()
+        file.write_bytes(file.read_bytes()[:40])
+    else:
+        (tmp_path / "cache").write_text("a file is in the way")
+    atlas.calls.clear()
+    again = Engine(lambda _: atlas, tmp_path / "cache")
+    again.open(card.path)
+    again.prepare_previews(card.path)
+    assert tabulations(atlas) == 1
+    assert again.has_previews(card.path)
+
+
+def test_tabulating_can_be_cancelled_and_leaves_nothing(engine, card, tmp_path):
+    engine.surface(ask(card.path, TEMPLATE))
+    with pytest.raises(Cancelled):
+        engine.prepare_previews(card.path, should_stop=lambda: True)
+    assert not engine.has_previews(card.path)
+    assert not (tmp_path / "cache").exists()

@@ -1,0 +1,233 @@
+"""A fitted patient at other covariates: single steps, paths through time, and the files made of them."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import io
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+from numpy.typing import NDArray
+
+from naisr_model.atlas import Atlas, Fit, Individual
+from naisr_model.covariates import Population, complete
+from naisr_model.errors import Cancelled, InputError
+from naisr_model.files import replacing
+from naisr_model.learning.posterior import moved
+
+Progress = Callable[[float], None]
+StopCheck = Callable[[], bool]
+
+BANDWIDTH = 0.3
+"""Of the kernel that makes the growth path, in standard deviations of the covariate that moves."""
+
+PIXELS = 400
+
+
+def fit_record(fit: Fit) -> dict[str, Any]:
+    """What is told of a fit, for JSON: real units, mm and cm3."""
+    return {
+        "covariates": fit.covariates,
+        "inferred": list(fit.inferred),
+        "intervals": {name: list(ends) for name, ends in fit.intervals.items()},
+        "alternatives": [dataclasses.asdict(one) for one in fit.alternatives],
+        "remarks": list(fit.remarks),
+        "residual_mm": fit.residual_mm,
+        "volume_cm3": fit.volume_cm3,
+        "volume_interval_cm3": list(fit.volume_interval_cm3),
+        "seconds": fit.seconds,
+        "latent": fit.latent.tolist(),
+    }
+
+
+def growth_path(population: Population, name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Mean of every covariate given one of them, from the training rows by local linear regression.
+
+    Age and weight go together: a child of one year with the mean weight of the cohort does not exist.
+
+    Args:
+        population: its training rows are used.
+        name: the covariate that moves.
+        values: its real values, ``[n]``.
+
+    Returns:
+        Real values of all covariates in order, ``[n, N]``, inside the observed ranges.
+    """
+    column = population.names.index(name)
+    rows = population.normalised()[~population.held_out]
+    places = population.covariates[column].normalise(values)
+    path = np.stack([_local_mean(rows[:, column], rows, float(place)) for place in places])
+    path[:, column] = places
+    real = [c.restore(path[:, i]).clip(*c.range) for i, c in enumerate(population.covariates)]
+    return np.stack(real, axis=1)
+
+
+def _local_mean(given: NDArray[np.float64], rows: NDArray[np.float64], place: float) -> NDArray[np.float64]:
+    """Value at ``place`` of the straight lines fitted to ``rows [n, N]`` near it."""
+    offset = given - place
+    weights = np.exp(-0.5 * (offset / BANDWIDTH) ** 2) + 1e-9  # never all 0, far from the data either
+    design = np.stack([np.ones_like(offset), offset], axis=1)
+    ridge = np.diag([0.0, 1e-6 * weights.sum()])
+    solution = np.linalg.solve((design.T * weights) @ design + ridge, (design.T * weights) @ rows)
+    return np.asarray(solution[0])
+
+
+def evolution(
+    fit: Fit, along: str, start: float | None, stop: float | None, steps: int, path: str
+) -> list[Individual]:
+    """The patient from ``start`` to ``stop`` of the covariate ``along``.
+
+    Args:
+        fit: of the patient.
+        along: the covariate that moves.
+        start: its first real value; None for the patient's.
+        stop: its last one; None for the largest observed.
+        steps: shapes, both ends included.
+        path: ``population``, ``only``, or the name of a CSV of covariates, which alone counts then.
+
+    Raises:
+        InputError: for an unknown covariate, a value out of range, too few steps or an unreadable CSV.
+    """
+    if path not in ("population", "only"):
+        return along_table(fit, Path(path))
+    known = {covariate.name: covariate for covariate in fit.individual.atlas.covariates}
+    if along not in known:
+        raise InputError(f"unknown covariate '{along}'; this atlas has {', '.join(known)}")
+    if steps < 1:
+        raise InputError(f"--steps is {steps}; give at least 1")
+    first = fit.covariates[along] if start is None else start
+    last = known[along].range[1] if stop is None else stop
+    values = np.linspace(first, last, steps)
+    return along_population(fit, along, values) if path == "population" else along_only(fit, along, values)
+
+
+def along_population(fit: Fit, name: str, values: NDArray[np.float64]) -> list[Individual]:
+    """The patient along the growth path.
+
+    The patient's own difference from the path, at the patient's value of the covariate that moves, is
+    kept, and binary covariates stay as they are.
+    """
+    population, own = fit.individual.atlas.population, fit.covariates
+    path = growth_path(population, name, np.append(values, own[name]))
+    result = []
+    for place, value in zip(path, values, strict=False):
+        step = {name: float(value)}
+        for i, covariate in enumerate(population.covariates):
+            if covariate.kind == "continuous" and covariate.name != name:
+                kept = own[covariate.name] + place[i] - path[-1, i]
+                step[covariate.name] = float(np.clip(kept, *covariate.range))
+        result.append(fit.at(step))
+    return result
+
+
+def along_only(fit: Fit, name: str, values: NDArray[np.float64]) -> list[Individual]:
+    """Phi_i of the patient: one covariate moves, the others are at the population centre."""
+    atlas, person = fit.individual.atlas, fit.individual
+    column = atlas.population.names.index(name)
+    result = []
+    for value in values:
+        complete(atlas.covariates, {name: float(value)})
+        vector = np.zeros(len(atlas.covariates))
+        vector[column] = float(atlas.covariates[column].normalise(value))
+        result.append(Individual(atlas, vector, person.latent, moved(person.posterior, vector)))
+    return result
+
+
+def along_table(fit: Fit, path: Path) -> list[Individual]:
+    """The patient at each row of a CSV whose header names covariates; those left out stay as fitted.
+
+    Raises:
+        InputError: when the file cannot be read, has no row, or holds what is no covariate value.
+    """
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            rows = list(csv.DictReader(file))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"the path {path} cannot be read ({error}); correct it") from error
+    if not rows:
+        raise InputError(f"the path {path} has no rows; give a header of covariates and a row for each step")
+    return [fit.at(parsed(fit.individual.atlas, row)) for row in rows]
+
+
+def parsed(atlas: Atlas, texts: dict[str, str]) -> dict[str, float]:
+    """Covariate values from texts by name.
+
+    Raises:
+        InputError: for an unknown covariate or a text that is no value of it.
+    """
+    known = {covariate.name: covariate for covariate in atlas.covariates}
+    if unknown := [name for name in texts if name not in known]:
+        raise InputError(f"unknown covariate '{unknown[0]}'; this atlas has {', '.join(known)}")
+    return {name: known[name].parse(text or "") for name, text in texts.items()}
+
+
+def write_series(
+    out: Path | None,
+    people: Sequence[Individual],
+    *,
+    progress: Progress | None = None,
+    should_stop: StopCheck | None = None,
+) -> list[dict[str, float | str]]:
+    """Measure each shape and, with ``out``, write it with a table and a picture into that folder.
+
+    Returns:
+        A record for each: covariates in real units, volume and its 95 % interval in cm3, mesh name.
+
+    Raises:
+        Cancelled: when ``should_stop()`` turned true.
+    """
+    records: list[dict[str, float | str]] = []
+    for number, person in enumerate(people, start=1):
+        if should_stop is not None and should_stop():
+            raise Cancelled
+        low, high = person.volume_interval_cm3
+        volumes = {"volume_cm3": person.volume_cm3, "volume_low_cm3": low, "volume_high_cm3": high}
+        records.append({**person.covariates, **volumes, "mesh": f"shape{number:02d}.stl"})
+        if out is not None:
+            with replacing(out / f"shape{number:02d}.stl") as temporary:
+                person.surface.export(temporary)
+        if progress is not None:
+            progress(number / len(people))
+    if out is not None:
+        _write_table(out / "volumes.csv", records)
+        _write_picture(out / "shapes.png", people)
+    return records
+
+
+def _title(person: Individual) -> str:
+    values = person.covariates
+    words = [covariate.format(values[covariate.name]) for covariate in person.atlas.covariates]
+    return f"{', '.join(words)}\n{person.volume_cm3:.1f} cm3"
+
+
+def _write_table(path: Path, records: Sequence[dict[str, float | str]]) -> None:
+    text = io.StringIO()
+    table = csv.DictWriter(text, list(records[0]), lineterminator="\n")
+    table.writeheader()
+    rounded = (
+        {key: round(value, 4) if isinstance(value, float) else value for key, value in record.items()}
+        for record in records
+    )
+    table.writerows(rounded)
+    with replacing(path) as temporary:
+        temporary.write_text(text.getvalue(), encoding="utf-8")
+
+
+def _write_picture(path: Path, people: Sequence[Individual]) -> None:
+    """The shapes side by side, at one scale and seen from one side."""
+    plotter = pv.Plotter(off_screen=True, shape=(1, len(people)), window_size=(PIXELS * len(people), PIXELS))
+    for column, person in enumerate(people):
+        plotter.subplot(0, column)
+        if len(person.surface.faces):
+            plotter.add_mesh(pv.wrap(person.surface), color="#d8c8b8", smooth_shading=True)
+        plotter.add_text(_title(person), font_size=8, color="black")
+    plotter.background_color = "white"
+    plotter.link_views()
+    plotter.view_yz()
+    with replacing(path) as temporary:
+        plotter.screenshot(temporary)
+    plotter.close()

@@ -1,0 +1,206 @@
+"""The template's vertices carried to a shape: a surface that moves instead of being found anew.
+
+A shape's surface is where T(p + d(p)) = 0, so the template's vertex q stands in it at the p that solves
+
+    p + d(p) = q,    d = sum_i g_i.
+
+With d tabulated this takes milliseconds, and every vertex keeps knowing its point of the template. Where
+p -> p + d(p) folds, a shape may hold more or other pieces than the template; that is looked for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+import trimesh
+from numpy.typing import NDArray
+from torch import Tensor
+
+from naisr_model.covariates import Covariate, Values, complete, normalised_vector
+from naisr_model.frames import Frame
+from naisr_model.networks.naisr import Naisr
+from naisr_model.surface.displacements import (
+    SPACINGS,
+    Displacements,
+    DisplacementTables,
+    jacobian,
+    sample,
+)
+
+RESOLVED = 0.02 * 2 / 128
+"""Model units within which p + d(p) must meet q: a fiftieth of a voxel of 128^3."""
+
+LONGEST_STEP = 4 * SPACINGS[-1]
+"""Of Newton's method, in model units: further on, the derivative says little."""
+
+STEPS = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Tracked:
+    """The template's surface carried to a shape.
+
+    Attributes:
+        points_mm: vertices, in the order of the template's, float32 ``[n, 3]``.
+        normals: outward unit normals, float32 ``[n, 3]``.
+        lost: share of the vertices for which no p was found.
+        folds: whether the deformation folds somewhere in the region that shapes can reach: the shape may
+            then differ from what is shown.
+    """
+
+    points_mm: NDArray[np.float32]
+    normals: NDArray[np.float32]
+    lost: float
+    folds: bool
+
+    @property
+    def is_trustworthy(self) -> bool:
+        """Whether this is the whole surface of the shape."""
+        return not (self.folds or self.lost)
+
+
+@dataclass(frozen=True, eq=False)
+class Tracker:
+    """Carries one template surface to any covariates, at one code.
+
+    Attributes:
+        covariates: of the atlas.
+        frame: millimetres to model units.
+        displacements: tabulated, of the code.
+        template_points: vertices q in model units, ``[3, n]``.
+        template_slopes: gradients of T there, ``[3, n]``.
+        faces: vertex numbers of the triangles, ``[m, 3]``; the same for every shape.
+    """
+
+    covariates: tuple[Covariate, ...]
+    frame: Frame
+    displacements: Displacements
+    template_points: Tensor
+    template_slopes: Tensor
+    faces: NDArray[np.int64]
+
+    def track(self, values: Values, start: Tracked | None = None) -> Tracked:
+        """Carry the template to ``values``.
+
+        Args:
+            values: real values by name; what is left out is at the centre, so that a single one gives
+                Phi_i.
+            start: a shape nearby, from which fewer steps are needed.
+
+        Raises:
+            InputError: for an unknown covariate or one out of range.
+        """
+        vector = normalised_vector(self.covariates, complete(self.covariates, values))
+        first = self.template_points if start is None else _rows(self.frame.to_model(start.points_mm))
+        with torch.inference_mode():
+            field = self.displacements.at(vector)
+            slopes = jacobian(field)
+            lower = self.displacements.lower
+            points, bends, error = _solve(torch.cat([field, slopes]), lower, self.template_points, first)
+            normals = _carried(bends, self.template_slopes)
+            folds = bool((_determinant(_matrix(slopes)) <= 0).any())
+        points_mm = self.frame.to_mm(_columns(points)).astype(np.float32)
+        return Tracked(points_mm, _columns(normals), float((error > RESOLVED).float().mean()), folds)
+
+
+def make_tracker(
+    network: Naisr,
+    covariates: tuple[Covariate, ...],
+    frame: Frame,
+    template_mm: trimesh.Trimesh,
+    tables: DisplacementTables,
+) -> Tracker:
+    """A tracker of the surface ``template_mm`` of T.
+
+    Args:
+        network: whose T it is.
+        covariates: of the atlas.
+        frame: millimetres to model units.
+        template_mm: a mesh of the zero level set of T.
+        tables: of the code in question.
+    """
+    points = torch.as_tensor(frame.to_model(template_mm.vertices), dtype=torch.float32, device=network.device)
+    located = points[None].requires_grad_()
+    (slopes,) = torch.autograd.grad(network.template(located).sum(), located)
+    return Tracker(
+        covariates,
+        frame,
+        Displacements(tables),
+        points.detach().T.cpu().contiguous(),
+        slopes[0].T.cpu().contiguous(),
+        np.asarray(template_mm.faces, dtype=np.int64),
+    )
+
+
+def enclosed_volume(points: NDArray[np.floating], faces: NDArray[np.integer]) -> float:
+    """Volume inside a closed surface, by the divergence theorem, in cubed units of ``points [n, 3]``."""
+    a, b, c = (points[faces[:, corner]].astype(np.float64) for corner in range(3))
+    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
+
+
+def _solve(field: Tensor, lower: Tensor, targets: Tensor, points: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """Newton's method for p + d(p) = q, all points at once; ``field [12, ...]`` is d and its Jacobian.
+
+    Returns:
+        The points p ``[3, n]``, the Jacobian there ``[9, n]``, and how far p + d(p) is from q ``[n]``.
+    """
+    steps = 0
+    while True:
+        found = sample(field, lower, points)
+        missing = targets - points - found[:3]
+        error = _length(missing)
+        if steps == STEPS or error.max() <= RESOLVED:
+            return points, found[3:], error
+        points = points + _shortened(_solved(_matrix(found[3:]), missing))
+        steps += 1
+
+
+def _matrix(slopes: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """Rows of I + grad d, each ``[3, ...]``, from the Jacobian ``[9, ...]``."""
+    rows = slopes.reshape(3, 3, *slopes.shape[1:]).clone()
+    for axis in range(3):
+        rows[axis, axis] += 1
+    return rows[0], rows[1], rows[2]
+
+
+def _determinant(rows: tuple[Tensor, Tensor, Tensor]) -> Tensor:
+    return (rows[0] * torch.linalg.cross(rows[1], rows[2], dim=0)).sum(dim=0)
+
+
+def _solved(rows: tuple[Tensor, Tensor, Tensor], right: Tensor) -> Tensor:
+    """Cramer's rule for one 3 x 3 system a point."""
+    a, b, c = rows
+    crossed = torch.linalg.cross(b, c, dim=0)
+    determinant = (a * crossed).sum(dim=0)
+    total = right[0] * crossed
+    total += right[1] * torch.linalg.cross(c, a, dim=0)
+    total += right[2] * torch.linalg.cross(a, b, dim=0)
+    return total / determinant.clamp(min=0.05)
+
+
+def _length(vectors: Tensor) -> Tensor:
+    """Of vectors ``[3, n]``; torch's own norm along the first axis takes five times as long."""
+    return vectors.square().sum(dim=0).sqrt()
+
+
+def _shortened(step: Tensor) -> Tensor:
+    return step * (LONGEST_STEP / _length(step).clamp(min=LONGEST_STEP))
+
+
+def _carried(slopes: Tensor, template_normals: Tensor) -> Tensor:
+    """Unit gradients of T(p + d(p)): (I + grad d)^T grad T."""
+    rows = _matrix(slopes)
+    bent = sum(row * part for row, part in zip(rows, template_normals, strict=True))
+    assert isinstance(bent, Tensor)
+    return bent / _length(bent).clamp(min=1e-12)
+
+
+def _rows(points: NDArray[np.floating]) -> Tensor:
+    """``[n, 3]`` as ``[3, n]``."""
+    return torch.from_numpy(np.ascontiguousarray(points.T, dtype=np.float32))
+
+
+def _columns(points: Tensor) -> NDArray[np.float32]:
+    return np.ascontiguousarray(points.numpy().T)

@@ -1,0 +1,151 @@
+"""Tabulated displacements and the template carried by them, against the networks themselves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import igl
+import numpy as np
+import pytest
+import torch
+import trimesh
+
+from naisr_model.atlas import Atlas
+from naisr_model.errors import Cancelled, InputError
+from naisr_model.networks.inference import displacement_function
+from naisr_model.surface.displacements import (
+    SPACINGS,
+    TOLERANCE,
+    Displacements,
+    DisplacementTables,
+    sample,
+)
+from naisr_model.surface.tracking import RESOLVED, Tracker, enclosed_volume
+
+VOXEL = 2 / 128
+
+
+@pytest.fixture(scope="module")
+def atlas(egg_atlas: Path) -> Atlas:
+    return Atlas.load(egg_atlas)
+
+
+@pytest.fixture(scope="module")
+def template(atlas: Atlas) -> trimesh.Trimesh:
+    return atlas.template(128)
+
+
+@pytest.fixture(scope="module")
+def tables(atlas: Atlas, template: trimesh.Trimesh) -> DisplacementTables:
+    return atlas.tabulate(template)
+
+
+@pytest.fixture(scope="module")
+def tracker(atlas: Atlas, template: trimesh.Trimesh, tables: DisplacementTables) -> Tracker:
+    return atlas.tracker(template, tables)
+
+
+def exact_displacement(atlas: Atlas, vector: list[float], points: np.ndarray) -> np.ndarray:
+    latent = torch.zeros(atlas.checkpoint.preset.network.latent)
+    field = displacement_function(atlas.checkpoint.network(), torch.tensor(vector), latent)
+    return field(torch.as_tensor(points, dtype=torch.float32)).numpy()
+
+
+def test_tables_agree_with_the_networks_between_nodes_and_knots(atlas, tables):
+    rng = np.random.default_rng(1)
+    points = rng.uniform(tables.region[0], tables.region[1], (500, 3))
+    displacements = Displacements(tables)
+    for vector in rng.uniform([-1.6, -1.0], [1.6, 1.0], (10, 2)).tolist():
+        found = sample(displacements.at(vector), displacements.lower, torch.as_tensor(points.T).float())
+        error = np.linalg.norm(found.numpy().T - exact_displacement(atlas, vector, points), axis=1)
+        assert error.max() < 2 * TOLERANCE * np.sqrt(3)
+        assert error.mean() < 0.25 * VOXEL
+
+
+def test_a_linear_field_is_tabulated_exactly():
+    region = np.array([[-0.5, -0.3, -0.1], [0.4, 0.3, 0.2]])
+    displacements = Displacements(DisplacementTables(region, ()))
+    z, y, x = torch.meshgrid(*(torch.arange(n) * SPACINGS[-1] for n in (5, 6, 7)), indexing="ij")
+    field = torch.stack([x + 2 * y - z])
+    points = torch.tensor([[0.03, 0.1, 0.15], [0.01, 0.05, 0.12], [0.02, 0.07, 0.11]])
+    found = sample(field, displacements.lower, points + displacements.lower[:, None])
+    torch.testing.assert_close(found[0], points[0] + 2 * points[1] - points[2])
+
+
+def test_at_the_centre_nothing_moves(tracker, template, atlas):
+    tracked = tracker.track({})
+    np.testing.assert_allclose(tracked.points_mm, template.vertices, atol=1e-3)
+    assert tracked.is_trustworthy
+
+
+@pytest.mark.parametrize("values", [{"age": 1.2}, {"age": 8.8, "sex": 1.0}, {"sex": -1.0}])
+def test_every_vertex_stands_on_the_shape_and_knows_its_point_of_the_template(
+    atlas, template, tracker, values
+):
+    tracked = tracker.track(values)
+    assert tracked.is_trustworthy
+    scale_mm = atlas.frame.scale_mm
+    assert np.abs(atlas.sdf(tracked.points_mm, values)).max() < 1.0 * VOXEL * scale_mm
+    vector = [float(c.normalise(values.get(c.name, c.centre))) for c in atlas.covariates]
+    points = atlas.frame.to_model(tracked.points_mm)
+    landed_mm = atlas.frame.to_mm(points + exact_displacement(atlas, vector, points))
+    off_mm = np.linalg.norm(landed_mm - template.vertices, axis=1)
+    assert off_mm.max() < (2 * TOLERANCE * np.sqrt(3) + RESOLVED) * scale_mm
+
+
+def test_the_carried_surface_is_the_exact_one(atlas, tracker):
+    values = {"age": 7.5, "sex": 0.5}
+    tracked, exact = tracker.track(values), atlas.shape(values)
+    assert enclosed_volume(tracked.points_mm, tracker.faces) == pytest.approx(exact.volume, rel=0.01)
+    squared_mm2, triangles, _ = igl.point_mesh_squared_distance(
+        tracked.points_mm.astype(float), exact.vertices, np.asarray(exact.faces)
+    )
+    assert np.sqrt(squared_mm2).mean() < 0.25 * VOXEL * atlas.frame.scale_mm
+    cosines = np.sum(exact.face_normals[triangles] * tracked.normals, axis=1)
+    assert np.median(cosines) > 0.99
+
+
+def test_where_it_starts_does_not_matter(tracker):
+    cold = tracker.track({"age": 8.0, "sex": 1.0})
+    warm = tracker.track({"age": 8.0, "sex": 1.0}, tracker.track({"age": 1.5}))
+    np.testing.assert_allclose(warm.points_mm, cold.points_mm, atol=0.05)
+
+
+def test_a_deformation_that_folds_is_told(atlas, template, tables):
+    folded = DisplacementTables(
+        tables.region, tuple(type(t)(t.spacing, t.knots, 30 * t.nodes) for t in tables.tables)
+    )
+    assert not atlas.tracker(template, folded).track({"age": 8.8, "sex": 1.0}).is_trustworthy
+
+
+def test_values_outside_the_observed_range_are_refused(tracker):
+    with pytest.raises(InputError, match="age"):
+        tracker.track({"age": 500.0})
+
+
+def test_tables_survive_the_disk(tables, tmp_path):
+    tables.save(tmp_path / "tables.safetensors")
+    again = DisplacementTables.load(tmp_path / "tables.safetensors")
+    vector = [0.7, -0.4]
+    torch.testing.assert_close(Displacements(again).at(vector), Displacements(tables).at(vector))
+
+
+@pytest.mark.parametrize("content", [b"", b"something else", None])
+def test_a_file_of_something_else_is_refused(tmp_path, content):
+    path = tmp_path / "tables.safetensors"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(InputError, match="tabulated"):
+        DisplacementTables.load(path)
+
+
+def test_tabulating_can_be_cancelled_and_reports_progress(atlas, template):
+    seen: list[float] = []
+    with pytest.raises(Cancelled):
+        atlas.tabulate(template, progress=seen.append, should_stop=lambda: bool(seen))
+    assert len(seen) == 1
+
+
+def test_the_volume_of_a_box():
+    box = trimesh.creation.box((2, 3, 4))
+    assert enclosed_volume(box.vertices + 5, box.faces) == pytest.approx(24)
