@@ -71,6 +71,7 @@ class Engine:
         self._atlases: OrderedDict[Path, Atlas] = OrderedDict()
         self._trackers: dict[Path, Tracker] = {}
         self._tracked: dict[tuple[Path, Panel], Tracked] = {}
+        self._preview: SurfaceResult | None = None  # the last one; sub-plots may show the same surface
         self._results: OrderedDict[SurfaceRequest, SurfaceResult] = OrderedDict()
 
     def open(self, path: Path) -> AtlasCard:
@@ -97,6 +98,7 @@ class Engine:
         return AtlasCard(path, atlas.name, tuple(atlas.covariates), atlas.population)
 
     def _forget(self, path: Path) -> None:
+        self._preview = None
         self._trackers.pop(path, None)
         for key in [key for key in self._tracked if key[0] == path]:
             del self._tracked[key]
@@ -177,9 +179,11 @@ class Engine:
         with self._lock:
             atlas, tracker = self._atlases[request.atlas], self._trackers.get(request.atlas)
         start = time.perf_counter()
-        if tracker is not None and request.resolution < EXACT_RESOLUTION:
-            return _tracked_result(request, tracker, self._track(request, tracker), start)
         question = simplest(request, atlas.covariates)
+        if tracker is not None and request.resolution < EXACT_RESOLUTION:
+            if self._preview is None or self._preview.request != question:
+                self._preview = _tracked_result(question, tracker, self._track(request, tracker), start)
+            return replace(self._preview, request=request)
         result = _result(question, _mesh(atlas, question, progress, should_stop), start)
         if should_stop is not None and should_stop():
             raise Cancelled

@@ -140,6 +140,14 @@ def test_previews_carry_the_template_once_displacements_are_tabulated(engine, ca
     assert first.origin is Origin.TABLES
 
 
+def test_equal_previews_are_carried_once(engine, card):
+    engine.prepare_previews(card.path)
+    alone = engine.surface(ask(card.path, Panel("effect", "age"), resolution=40, age=60.0))
+    whole = engine.surface(ask(card.path, resolution=40, age=60.0, weight=35.0, sex=0.0))
+    assert whole.points_mm is alone.points_mm
+    assert whole.request.panel == FULL_SHAPE
+
+
 def test_an_exact_surface_tells_how_far_off_its_preview_was(engine, card):
     assert engine.surface(ask(card.path, age=50.0)).preview_error_mm is None
     engine.prepare_previews(card.path)
