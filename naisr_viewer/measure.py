@@ -5,7 +5,8 @@ What is written:
 - ``window_visible_s``: from the start of the process to the first painting of the window.
 - ``first_picture_s``: from the start of the process until all views are exact and painted.
 - ``previews_ready_s``: from the start of the process until previews are fast; null if that took too long.
-- ``covariate``, ``views``: whose slider was dragged, and how many sub-plots were on screen.
+- ``covariate``, ``views``: whose slider was dragged, the others being off their centre, and how many
+  sub-plots were on screen.
 - ``events``, ``frames``: how often the slider changed while the mouse was down, and how many pictures
   with a new value were painted meanwhile.
 - ``frames_dropped``: how many values were overtaken by a newer one before they were painted.
@@ -170,6 +171,7 @@ def measure(
     ready = _wait(lambda: engine.has_previews(atlas), PREVIEWS_S)
     previews_ready_s = time.monotonic() - started if ready else None
     observer.name, row = next(iter(window.covariates.rows.items()))
+    _leave_the_centre(controller, observer)
     events, released = _drag(row)
     _wait(lambda: observer.complete_since(released) is not None)
     figures = {
@@ -180,6 +182,16 @@ def measure(
     }
     text = json.dumps(figures, indent=2) + "\n"
     write_atomically(file, lambda place: place.write_text(text, encoding="utf-8"))
+
+
+def _leave_the_centre(controller: Controller, observer: Observer) -> None:
+    """Move what is not dragged: at the centre the full shape would be the dragged effect, and free."""
+    assert controller.state.atlas is not None
+    moment = time.monotonic()
+    for covariate in controller.state.atlas.covariates:
+        if covariate.name != observer.name:
+            controller.settle(covariate.name, (covariate.centre + covariate.range[1]) / 2)
+    _wait(lambda: observer.complete_since(moment) is not None)
 
 
 def _figures(
