@@ -407,7 +407,6 @@ def reconstruction(
     from naisr_model.evaluation.reconstruction import EvaluationConfig
     from naisr_model.evaluation.reconstruction import evaluate as run
     from naisr_model.evaluation.tables import PUBLISHED_AIRWAY, reconstruction_markdown
-    from naisr_model.files import replacing
 
     if limit < 0:
         raise InputError(f"--limit is {limit}; give 0 or more")
@@ -422,9 +421,7 @@ def reconstruction(
             should_stop=stop,
         )
     print(reconstruction_markdown(report, PUBLISHED_AIRWAY if loaded.name == "airway" else ()))
-    if json_file is not None:
-        with replacing(json_file) as temporary:
-            temporary.write_text(json.dumps(report, indent=1), encoding="utf-8")
+    _write_json(json_file, report)
 
 
 @evaluate.command
@@ -504,15 +501,12 @@ def bench(
     """
     from naisr_model.evaluation.bench import QUICK, Scope, default_atlas, markdown
     from naisr_model.evaluation.bench import bench as run
-    from naisr_model.files import replacing
 
     scope = QUICK if quick else Scope()
     with _bar("measuring") as progress, _stoppable() as stop:
         record = run(atlas or default_atlas(), scope, progress=progress, should_stop=stop)
     print(markdown(record, scope))
-    if json_file is not None:
-        with replacing(json_file) as temporary:
-            temporary.write_text(json.dumps(record, indent=1), encoding="utf-8")
+    _write_json(json_file, record)
 
 
 def _values(atlas: Any, settings: list[str]) -> dict[str, float]:

@@ -92,7 +92,7 @@ def view(
     if not path.is_file():
         raise InputError(f"there is no file {path}; give the path of an atlas (.safetensors)")
     leave_a_core_to_the_window()
-    gc.set_threshold(50_000)  # imports make many objects that stay; looking for garbage among them is a tenth
+    gc.set_threshold(50_000)  # imports make many objects that stay: seldom worth looking through
     engine = Engine()
     if measure is not None:
         return _measured(engine, path, pixels, measure)

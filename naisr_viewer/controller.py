@@ -317,16 +317,10 @@ class Controller(QObject):
 
     def _frame_job(self, requests: list[SurfaceRequest]) -> Job:
         """All surfaces of one moment, handed over together so that they are painted together."""
-        engine = self._engine
-
-        def job(
-            deliver: Callable[[object], None],
-            progress: Callable[[float], None],
-            should_stop: Callable[[], bool],
-        ) -> None:
-            deliver(tuple(engine.surface(request, None, should_stop) for request in requests))
-
-        return job
+        surface = self._engine.surface
+        return lambda deliver, _, should_stop: deliver(
+            tuple(surface(request, None, should_stop) for request in requests)
+        )
 
     def _surfaces_job(self, requests: list[SurfaceRequest]) -> Job:
         """Surfaces that are handed over one by one, because each takes a while."""
@@ -349,15 +343,10 @@ class Controller(QObject):
             return
         path = self._preparing = atlas.path
 
-        def job(
-            deliver: Callable[[object], None],
-            progress: Callable[[float], None],
-            should_stop: Callable[[], bool],
-        ) -> None:
-            engine.prepare_previews(path, progress, should_stop)
-
         self._background.cancel()
-        self._background.submit(job)
+        self._background.submit(
+            lambda _, progress, should_stop: engine.prepare_previews(path, progress, should_stop)
+        )
 
     def _start(self, task: Task, job: Job) -> None:
         if task in (Task.OPENING, Task.EXPORT):
