@@ -33,14 +33,17 @@ from naisr_model.learning.posterior import (
     surface_deviations,
     volume_deviation,
 )
-from naisr_model.learning.prior import Prior, prior_of
+from naisr_model.learning.prior import Prior, places_of, prior_of
 from naisr_model.learning.target import target_of
+from naisr_model.networks.devices import usable_device
+from naisr_model.networks.naisr import Naisr
 from naisr_model.surface.displacements import DisplacementTables, tabulate
 from naisr_model.surface.fields import distances, effect_field, shape_field, template_field
 from naisr_model.surface.isosurface import isosurface
 from naisr_model.surface.lattice import Lattice
 from naisr_model.surface.sparse import CHUNK, COARSEST, Field, evaluate_band
 from naisr_model.surface.tracking import Tracker, make_tracker
+from naisr_model.surface.volume import enclosed_volume
 
 Progress = Callable[[float], None]
 StopCheck = Callable[[], bool]
@@ -49,8 +52,14 @@ VOLUME_RESOLUTION = 128
 CHECK_SAMPLE = 2000
 """Seed of the points at which a fit's residual is measured; the fit itself draws others."""
 
+TAIL = 0.025
+"""Probability of lying below, and above, an interval."""
+
 WORTH_TELLING = 0.05
 """Least probability of an alternative that is told."""
+
+MISSED_SHARE = 0.01
+"""Of the atlas's unit of length, about half of its largest shape: a residual beyond it is no good fit."""
 
 UNTOLD_SHARE = 0.5
 """An interval wider than this share of the observed range says that the shape hardly tells the covariate."""
@@ -68,20 +77,35 @@ class Atlas:
     a computation with :class:`~naisr_model.errors.Cancelled`.
 
     Inference has no randomness: the same question has the same answer.
+
+    Args:
+        checkpoint: what was trained.
+        device: where the fields are evaluated and tabulated: cpu, cuda or mps. A tracker, which moves some
+            thousand vertices, and a fit, which evaluates some hundred points a step, work on the CPU
+            wherever that is.
+
+    Raises:
+        InputError: when torch cannot compute on the device.
     """
 
-    def __init__(self, checkpoint: Checkpoint) -> None:
+    def __init__(self, checkpoint: Checkpoint, device: str | torch.device = "cpu") -> None:
         self.checkpoint = checkpoint
-        self._network = checkpoint.network().requires_grad_(False)
+        self.device = usable_device(device)
+        self._network = checkpoint.network().to(self.device).requires_grad_(False)
 
     @classmethod
-    def load(cls, path: str | Path) -> Atlas:
+    def load(cls, path: str | Path, device: str | torch.device = "cpu") -> Atlas:
         """Read an atlas from a ``.safetensors`` file.
 
+        Args:
+            path: the file.
+            device: where the fields are evaluated.
+
         Raises:
-            InputError: when the file is missing, damaged, foreign or too new.
+            InputError: when the file is missing, damaged, foreign or too new, or torch cannot compute on
+                the device.
         """
-        return cls(load(path))
+        return cls(load(path), device)
 
     @property
     def name(self) -> str:
@@ -142,17 +166,21 @@ class Atlas:
         resolution: int = 128,
         *,
         extrapolate: bool = False,
+        tracker: Tracker | None = None,
         progress: Progress | None = None,
         should_stop: StopCheck | None = None,
     ) -> trimesh.Trimesh:
         """The full shape, the zero level set of Phi(p, c, z) = T(p + sum_i g_i(p, c_i, z)).
+
+        A ``tracker`` of this atlas and code makes it several times faster; the surface is the same.
 
         Raises:
             InputError: for an unknown covariate or one out of range (unless ``extrapolate``).
             Cancelled: when ``should_stop()`` turned true.
         """
         field = shape_field(self._network, self._vector(covariates, extrapolate), self._latent(latent))
-        return self._surface(field, resolution, progress, should_stop)
+        guess = None if tracker is None else tracker.guess(covariates)
+        return self._surface(field, resolution, progress, should_stop, guess)
 
     def effect(
         self,
@@ -162,12 +190,14 @@ class Atlas:
         resolution: int = 128,
         *,
         extrapolate: bool = False,
+        tracker: Tracker | None = None,
         progress: Progress | None = None,
         should_stop: StopCheck | None = None,
     ) -> trimesh.Trimesh:
         """The disentangled shape of one covariate, Phi_i(p, c_i, z) = T(p + g_i(p, c_i, z)).
 
-        The displacements of several covariates add at one query point; these surfaces do not.
+        The displacements of several covariates add at one query point; these surfaces do not. A
+        ``tracker`` of this atlas and code makes it several times faster; the surface is the same.
 
         Raises:
             InputError: for an unknown covariate or one out of range (unless ``extrapolate``).
@@ -176,7 +206,8 @@ class Atlas:
         vector = self._vector({name: value}, extrapolate)
         index = self.population.names.index(name)
         field = effect_field(self._network, index, vector, self._latent(latent))
-        return self._surface(field, resolution, progress, should_stop)
+        guess = None if tracker is None else tracker.guess({name: value})
+        return self._surface(field, resolution, progress, should_stop, guess)
 
     def template(
         self,
@@ -219,6 +250,8 @@ class Atlas:
     def tracker(self, template: trimesh.Trimesh, tables: DisplacementTables) -> Tracker:
         """What carries ``template`` to any covariates in milliseconds, vertex by vertex.
 
+        It also makes :meth:`shape` and :meth:`effect` faster.
+
         Args:
             template: a mesh that :meth:`template` gave.
             tables: from :meth:`tabulate`.
@@ -253,14 +286,14 @@ class Atlas:
         )
         binary = [i for i, covariate in enumerate(self.covariates) if covariate.kind == "binary"]
         target = target_of(shape, self.frame)
+        network = self._cpu_network
         fits = fit_shape(
-            self._network, target, self._prior, vector, binary, progress=progress, should_stop=should_stop
+            network, target, self._prior, vector, binary, progress=progress, should_stop=should_stop
         )
-        posterior = posterior_of(self._network, target, self._prior, fits[0])
+        posterior = posterior_of(network, target, self._prior, fits[0])
         check = draw_sample(target, POINTS, CHECK_SAMPLE).points[:POINTS].numpy()
-        code = torch.as_tensor(fits[0].latent, dtype=torch.float32)
-        found = torch.as_tensor(fits[0].covariates, dtype=torch.float32)
-        residuals = np.abs(distances(self._network, check, found, code))
+        found, code = network.tensor(fits[0].covariates), network.tensor(fits[0].latent)
+        residuals = np.abs(distances(network, check, found, code))
         return Fit(
             Individual(self, fits[0].covariates, fits[0].latent, posterior),
             tuple(fits),
@@ -270,24 +303,33 @@ class Atlas:
         )
 
     @cached_property
+    def _cpu_network(self) -> Naisr:
+        if self.device.type == "cpu":
+            return self._network
+        return self.checkpoint.network().requires_grad_(False)
+
+    @cached_property
     def _prior(self) -> Prior:
         return prior_of(self.population, self.checkpoint.latents)
 
     def _vector(self, covariates: Values, extrapolate: bool) -> Tensor:
         values = complete(self.covariates, covariates, extrapolate=extrapolate)
-        return torch.as_tensor(normalised_vector(self.covariates, values), dtype=torch.float32)
+        return self._network.tensor(normalised_vector(self.covariates, values))
 
     def _latent(self, latent: ArrayLike | None) -> Tensor:
         length = self.checkpoint.preset.network.latent
-        if latent is None:
-            return torch.zeros(length)
-        code = torch.as_tensor(np.asarray(latent, dtype=np.float32))
+        code = self._network.tensor(np.zeros(length) if latent is None else latent)
         if code.shape != (length,):
             raise InputError(f"the latent code has shape {tuple(code.shape)}; this atlas needs ({length},)")
         return code
 
     def _surface(
-        self, field: Field, resolution: int, progress: Progress | None, should_stop: StopCheck | None
+        self,
+        field: Field,
+        resolution: int,
+        progress: Progress | None,
+        should_stop: StopCheck | None,
+        guess: Field | None = None,
     ) -> trimesh.Trimesh:
         if self.frame.dim != 3:
             raise InputError("surfaces are made of 3D atlases; this one holds curves in the plane")
@@ -296,7 +338,7 @@ class Atlas:
                 f"resolution is {resolution}; give a multiple of {COARSEST} from {2 * COARSEST} on"
             )
         lattice = Lattice(resolution)
-        return isosurface(evaluate_band(field, lattice, progress, should_stop), lattice, self.frame)
+        return isosurface(evaluate_band(field, lattice, progress, should_stop, guess), lattice, self.frame)
 
 
 @dataclass(frozen=True, eq=False)
@@ -346,24 +388,29 @@ class Individual:
 
     @cached_property
     def volume_cm3(self) -> float:
-        """Volume of the shape."""
-        return float(self.surface.volume) / 1000
+        """Volume of the smooth shape; the triangles of :attr:`surface` alone hold a little less."""
+        mesh = self.surface
+        return enclosed_volume(mesh.vertices, mesh.vertex_normals, mesh.faces) / 1000
 
     @cached_property
     def volume_interval_cm3(self) -> tuple[float, float]:
         """Where the true volume is with a probability of 95 %."""
-        surface, scale = self.surface, self.atlas.frame.scale_mm
-        if not len(surface.faces):
-            return 0.0, 0.0
-        points = self.atlas.frame.to_model(surface.sample(POINTS, seed=0)).astype(np.float32)
-        area = surface.area / scale**2
-        deviation = volume_deviation(self.posterior, points, area, self.vector, self.latent)
-        half = TWO_SIDED_95 * deviation * scale**3 / 1000
-        return max(0.0, self.volume_cm3 - half), self.volume_cm3 + half
+        margin = self.volume_margin_cm3(self.surface)
+        return max(0.0, self.volume_cm3 - margin), self.volume_cm3 + margin
 
-    def surface_sd_mm(self, mesh: trimesh.Trimesh) -> NDArray[np.float64]:
-        """Standard deviation along the normal at the vertices of a mesh that :meth:`shape` gave, ``[n]``."""
-        points = self.atlas.frame.to_model(mesh.vertices).astype(np.float32)
+    def volume_margin_cm3(self, mesh: trimesh.Trimesh) -> float:
+        """Half of the 95 % interval of the volume of a mesh that :meth:`shape` gave."""
+        scale = self.atlas.frame.scale_mm
+        if not len(mesh.faces):
+            return 0.0
+        points = self.atlas.frame.to_model(mesh.sample(POINTS, seed=0)).astype(np.float32)
+        area = mesh.area / scale**2
+        deviation = volume_deviation(self.posterior, points, area, self.vector, self.latent)
+        return TWO_SIDED_95 * deviation * scale**3 / 1000
+
+    def surface_sd_mm(self, points_mm: ArrayLike) -> NDArray[np.float64]:
+        """Standard deviation of the surface along its normal at points ``[n, 3]`` on it, ``[n]``."""
+        points = self.atlas.frame.to_model(points_mm).astype(np.float32)
         deviations = surface_deviations(self.posterior, points, self.vector, self.latent)
         return deviations * self.atlas.frame.scale_mm
 
@@ -387,7 +434,7 @@ class Fit:
 
     Attributes:
         individual: the fitted shape with its uncertainty.
-        results: the fits at each combination of unknown binary covariates, the best first.
+        results: the fits of explanations that differ in their covariates, the best first.
         inferred: names of the covariates that were not known.
         residual_mm: mean distance of the patient's points, others than those of the fit, to the surface.
         seconds: what the fit took.
@@ -413,13 +460,11 @@ class Fit:
     def alternatives(self) -> tuple[Alternative, ...]:
         """Everything that explains the shape with a probability worth telling, the best first.
 
-        One alternative means that the levels of the binary covariates are beyond doubt.
+        One alternative means that nothing far from the covariates told explains the shape.
         """
-        surprises = np.array([result.surprise for result in self.results])
-        odds = np.exp((surprises.min() - surprises) / 2)
         told = [
             Alternative(self._real(result.covariates), float(share))
-            for result, share in zip(self.results, odds / odds.sum(), strict=True)
+            for result, share in zip(self.results, self._shares, strict=True)
         ]
         return tuple(one for one in told if one.probability >= WORTH_TELLING)
 
@@ -430,25 +475,18 @@ class Fit:
         Continuous covariates keep to their observed range; a binary one spans both of its levels
         where both are possible.
         """
-        deviations = self.individual.posterior.covariate_deviations
-        found = {}
-        for column, covariate in enumerate(self.individual.atlas.covariates):
-            if covariate.name not in self.inferred:
-                continue
-            if covariate.kind == "binary":
-                levels = [one.covariates[covariate.name] for one in self.alternatives]
-                found[covariate.name] = (min(levels), max(levels))
-            else:
-                half = TWO_SIDED_95 * deviations[column]
-                ends = covariate.restore(self.individual.vector[column] + np.array([-half, half]))
-                low, high = np.clip(ends, *covariate.range)
-                found[covariate.name] = (float(low), float(high))
-        return found
+        columns = enumerate(self.individual.atlas.covariates)
+        return {one.name: self._interval(column, one) for column, one in columns if one.name in self.inferred}
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """A sentence on each covariate that the shape does not settle."""
+        """A sentence on each covariate that the shape does not settle, and on a shape that was missed."""
         sentences = []
+        if self.residual_mm > MISSED_SHARE * self.individual.atlas.frame.scale_mm:
+            sentences.append(
+                f"the fitted surface is {self.residual_mm:.2g} mm from the shape on average: "
+                "check the alignment and the known covariates"
+            )
         for covariate in self.individual.atlas.covariates:
             low, high = self.intervals.get(covariate.name, (0.0, 0.0))
             extent = covariate.range[1] - covariate.range[0]
@@ -475,9 +513,9 @@ class Fit:
         """The fitted shape in millimetres."""
         return self.individual.shape(resolution)
 
-    def surface_sd_mm(self, mesh: trimesh.Trimesh) -> NDArray[np.float64]:
-        """Standard deviation along the normal at the vertices of a mesh that :meth:`shape` gave, ``[n]``."""
-        return self.individual.surface_sd_mm(mesh)
+    def surface_sd_mm(self, points_mm: ArrayLike) -> NDArray[np.float64]:
+        """Standard deviation of the surface along its normal at points ``[n, 3]`` on it, ``[n]``."""
+        return self.individual.surface_sd_mm(points_mm)
 
     def at(self, values: Values, *, extrapolate: bool = False) -> Individual:
         """The same person at other covariates (the paper's shape transfer); the rest stays as fitted.
@@ -493,3 +531,23 @@ class Fit:
     def _real(self, vector: NDArray[np.float64]) -> dict[str, float]:
         pairs = zip(self.individual.atlas.covariates, vector, strict=True)
         return {covariate.name: float(covariate.restore(value)) for covariate, value in pairs}
+
+    @property
+    def _shares(self) -> NDArray[np.float64]:
+        """Probability of each of the results."""
+        surprises = np.array([result.surprise for result in self.results])
+        odds = np.exp((surprises.min() - surprises) / 2)
+        return np.asarray(odds / odds.sum())
+
+    def _interval(self, column: int, covariate: Covariate) -> tuple[float, float]:
+        """The middle 95 % of all explanations; of a binary covariate the levels worth telling."""
+        if covariate.kind == "binary":
+            levels = np.array([result.covariates[column] for result in self.results])
+            possible = [level for level in levels if self._shares[levels == level].sum() >= WORTH_TELLING]
+            return float(min(possible)), float(max(possible))
+        number = int(np.flatnonzero(self.results[0].free == column)[0])
+        densities = np.array([result.densities[number] for result in self.results])
+        places = places_of(self.individual.atlas._prior, column)
+        ends = np.interp([TAIL, 1 - TAIL], np.cumsum(self._shares @ densities), places)
+        low, high = covariate.restore(ends).tolist()
+        return low, high

@@ -66,7 +66,7 @@ def test_a_verdict_follows_the_target():
 
 
 def test_the_smoke_run_measures_everything_but_the_missing_window(egg_atlas, tmp_path, monkeypatch, capsys):
-    def no_window(atlas, file):
+    def no_window(atlas, file, device):
         raise bench.Impossible("Not measured: the window; there is no display.")
 
     monkeypatch.setattr(bench, "watched", no_window)
@@ -90,7 +90,7 @@ def test_what_the_window_says_of_itself_is_passed_on(egg_atlas, monkeypatch):
     told = iter(
         [dict.fromkeys(bench.WINDOW, value) | {"events": 10, "frames_dropped": 4} for value in (3, 1, 2)]
     )
-    monkeypatch.setattr(bench, "watched", lambda atlas, file: next(told))
+    monkeypatch.setattr(bench, "watched", lambda atlas, file, device: next(told))
     scope = dataclasses.replace(bench.QUICK, viewer_runs=3)
     figures = bench.window(bench.Subject(egg_atlas, Atlas.load(egg_atlas), scope))
     assert figures == dict.fromkeys(bench.WINDOW, 2.0) | {"frames_dropped_share": 0.4}

@@ -9,14 +9,16 @@ import trimesh
 from scipy.spatial import cKDTree
 from skimage.measure import marching_cubes
 
+from naisr_model.atlas import Atlas
 from naisr_model.checkpoint import load
+from naisr_model.covariates import normalised_vector
 from naisr_model.errors import Cancelled
 from naisr_model.frames import Frame
 from naisr_model.surface import sparse
 from naisr_model.surface.fields import shape_field
 from naisr_model.surface.isosurface import isosurface
 from naisr_model.surface.lattice import Lattice
-from naisr_model.surface.sparse import evaluate_band, evaluate_everywhere
+from naisr_model.surface.sparse import continued, evaluate_band, evaluate_everywhere
 
 FRAME = Frame((10.0, 0.0, -5.0), 50.0)
 
@@ -124,9 +126,9 @@ class Recording:
         return [int(np.gcd.reduce(batch, axis=None, initial=lattice.resolution)) for batch in indices]
 
 
-def assert_same_mesh(field, lattice):
+def assert_same_mesh(field, lattice, guess=None):
     dense = isosurface(evaluate_everywhere(field, lattice), lattice, FRAME)
-    banded = isosurface(evaluate_band(field, lattice), lattice, FRAME)
+    banded = isosurface(evaluate_band(field, lattice, guess=guess), lattice, FRAME)
     assert len(dense.faces)
     assert dense.faces.tolist() == banded.faces.tolist()
     assert np.abs(dense.vertices - banded.vertices).max() < 1e-5 * 2 * FRAME.scale_mm
@@ -184,6 +186,19 @@ def test_nothing_is_missed_at_the_corners_of_a_shipped_atlas(atlas, corner):
     assert_same_mesh(shape_field(checkpoint.network(), torch.tensor(extremes), latent), Lattice(48))
 
 
+@pytest.mark.parametrize("name", ["airway", "bodies"])
+def test_a_tracker_misses_nothing_of_a_shipped_atlas(name):
+    atlas = Atlas.load(Path(__file__).parents[1] / "resources" / f"{name}.safetensors")
+    template, network = atlas.template(128), atlas.checkpoint.network()
+    tracker = atlas.tracker(template, atlas.tabulate(template))
+    latent = torch.zeros(atlas.checkpoint.preset.network.latent)
+    low, high = np.array([c.range for c in atlas.covariates]).T
+    for place in (low, np.random.default_rng(0).uniform(low, high)):
+        values = dict(zip(atlas.population.names, place.tolist(), strict=True))
+        vector = torch.tensor(normalised_vector(atlas.covariates, values)).float()
+        assert_same_mesh(shape_field(network, vector, latent), Lattice(48), tracker.guess(values))
+
+
 def test_no_point_is_evaluated_twice_and_few_are_evaluated_at_all():
     counts = []
     for resolution in (64, 128, 256):
@@ -193,6 +208,68 @@ def test_no_point_is_evaluated_twice_and_few_are_evaluated_at_all():
         counts.append(len(recording.points))
     assert counts[1] < 129**3 / 25 and counts[2] < 257**3 / 60
     assert np.log2(counts[2] / counts[0]) / 2 < 2.2
+
+
+def two_balls(points):
+    return np.minimum(ball(points, [-0.4, 0, 0], 0.35), ball(points, [0.45, 0.1, 0], 0.3))
+
+
+def ball_with_speck(points):
+    return np.minimum(ball(points, [-0.4, 0, 0], 0.35), ball(points, [0.6, 0.4, 0.3], 0.04))
+
+
+def slightly_off(field):
+    """By up to a fifth of a cell of 64^3, now here, now there."""
+    return lambda points: field(points) + np.float32(0.006) * np.sin(9 * points).prod(axis=1)
+
+
+@pytest.mark.parametrize("field", FIELDS)
+def test_a_guess_saves_evaluations_and_changes_nothing(field):
+    lattice = Lattice(64)
+    counts = []
+    for guess in (None, slightly_off(field)):
+        recording = Recording(field)
+        evaluate_band(recording, lattice, guess=guess)
+        assert len(np.unique(recording.points, axis=0)) == len(recording.points)
+        counts.append(len(recording.points))
+    assert counts[1] < 0.6 * counts[0]
+    assert_same_mesh(field, lattice, slightly_off(field))
+
+
+WRONG_GUESSES = {
+    "elsewhere by voxels": lambda points: two_balls(points + np.float32(0.1)),
+    "one component": lambda points: ball(points, [-0.4, 0, 0], 0.35),
+    "one component too many": lambda points: np.minimum(two_balls(points), ball(points, [0, 0.7, 0], 0.1)),
+    "components joined": lambda points: two_balls(points) - np.float32(0.1),
+    "nothing": lambda points: np.full(len(points), 9, np.float32),
+    "everything": lambda points: np.full(len(points), -9, np.float32),
+    "inside out": lambda points: -two_balls(points),
+    "half as steep": lambda points: two_balls(points) / 2,
+}
+
+
+@pytest.mark.parametrize("guess", WRONG_GUESSES.values(), ids=WRONG_GUESSES)
+def test_a_wrong_guess_does_not_change_the_mesh(guess):
+    for field in (two_balls, ball_with_speck, shell):
+        assert_same_mesh(field, Lattice(64), guess)
+
+
+def test_a_guess_that_errs_in_one_place_is_trusted_less_everywhere():
+    """A dent deeper than a cell, which no probe meets."""
+
+    def dented(points):
+        across = np.linalg.norm(points - np.array([0.1, 0.03, 0.5], np.float32), axis=1)
+        return (sphere(points) + 1.2 / 32 * np.exp(-((across / 0.05) ** 2))).astype(np.float32)
+
+    lattice = Lattice(64)
+    counts = []
+    for guess in (sphere, dented, None):
+        recording = Recording(sphere)
+        evaluate_band(recording, lattice, guess=guess)
+        counts.append(len(recording.points))
+    assert 1.2 * counts[0] < counts[1] < 0.9 * counts[2]
+    assert_same_mesh(sphere, lattice, dented)
+    assert_same_mesh(dented, lattice, sphere)
 
 
 def test_a_bound_that_is_broken_on_the_way_is_widened():
@@ -205,6 +282,19 @@ def test_a_bound_that_is_broken_on_the_way_is_widened():
         # Coarser levels are gone through again only after a finer one broke the bound.
         assert (strides != sorted(strides, reverse=True)) == widened
         assert len(recording.points) < 65**3
+
+
+def test_between_evaluated_nodes_a_field_is_continued():
+    def plane(points):
+        return (points @ np.array([0.6, 0.8, 0]) - 0.1).astype(np.float32)
+
+    lattice = Lattice(64)
+    for field, tolerance in ((plane, 1e-6), (sphere, lattice.spacing)):
+        everywhere = evaluate_everywhere(field, lattice)
+        found = continued(evaluate_band(field, lattice), lattice)
+        assert np.abs(found - everywhere).max() < tolerance
+    near = np.abs(everywhere) < lattice.spacing / 2
+    np.testing.assert_array_equal(found[near], everywhere[near])
 
 
 def test_the_surface_is_followed_out_of_what_was_evaluated():

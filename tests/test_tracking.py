@@ -20,7 +20,10 @@ from naisr_model.surface.displacements import (
     DisplacementTables,
     sample,
 )
-from naisr_model.surface.tracking import RESOLVED, Tracker, enclosed_volume
+from naisr_model.surface.fields import shape_field
+from naisr_model.surface.lattice import Lattice
+from naisr_model.surface.sparse import evaluate_band
+from naisr_model.surface.tracking import RESOLVED, Tracker
 
 VOXEL = 2 / 128
 
@@ -96,13 +99,51 @@ def test_every_vertex_stands_on_the_shape_and_knows_its_point_of_the_template(
 def test_the_carried_surface_is_the_exact_one(atlas, tracker):
     values = {"age": 7.5, "sex": 0.5}
     tracked, exact = tracker.track(values), atlas.shape(values)
-    assert enclosed_volume(tracked.points_mm, tracker.faces) == pytest.approx(exact.volume, rel=0.01)
+    carried = trimesh.Trimesh(tracked.points_mm, tracker.faces, process=False)
+    assert carried.volume == pytest.approx(exact.volume, rel=0.01)
     squared_mm2, triangles, _ = igl.point_mesh_squared_distance(
         tracked.points_mm.astype(float), exact.vertices, np.asarray(exact.faces)
     )
     assert np.sqrt(squared_mm2).mean() < 0.25 * VOXEL * atlas.frame.scale_mm
     cosines = np.sum(exact.face_normals[triangles] * tracked.normals, axis=1)
     assert np.median(cosines) > 0.99
+
+
+@pytest.mark.parametrize("values", [{}, {"age": 1.2}, {"age": 8.8, "sex": 1.0}])
+def test_the_guess_is_the_field_near_the_surface(atlas, tracker, values):
+    vertices_mm = atlas.shape(values).vertices
+    points = atlas.frame.to_model(vertices_mm).astype(np.float32)
+    assert np.abs(tracker.guess(values)(points)).max() < 0.5 * VOXEL
+
+
+def test_a_tracker_saves_evaluations_and_changes_nothing(atlas, tracker):
+    values, lattice = {"age": 8.0, "sex": 0.5}, Lattice(128)
+    vector = torch.tensor([float(c.normalise(values[c.name])) for c in atlas.covariates])
+    field = shape_field(
+        atlas.checkpoint.network(), vector, torch.zeros(atlas.checkpoint.preset.network.latent)
+    )
+    counts = []
+
+    def counting(points):
+        counts.append(len(points))
+        return field(points)
+
+    evaluate_band(counting, lattice)
+    without = sum(counts)
+    counts.clear()
+    evaluate_band(counting, lattice, guess=tracker.guess(values))
+    assert sum(counts) < without / 2
+
+
+@pytest.mark.parametrize("latent", [0.0, 0.3], ids=["own code", "another code"])
+def test_surfaces_are_the_same_with_and_without_a_tracker(atlas, tracker, latent):
+    code = np.full(atlas.checkpoint.preset.network.latent, latent)
+    for one, other in (
+        [atlas.shape({"age": 2.5, "sex": -1.0}, code, 64, tracker=each) for each in (None, tracker)],
+        [atlas.effect("age", 9.5, code, 64, extrapolate=True, tracker=each) for each in (None, tracker)],
+    ):
+        assert one.faces.tolist() == other.faces.tolist()
+        assert np.abs(one.vertices - other.vertices).max() < 1e-5 * 2 * atlas.frame.scale_mm
 
 
 def test_where_it_starts_does_not_matter(tracker):
@@ -144,8 +185,3 @@ def test_tabulating_can_be_cancelled_and_reports_progress(atlas, template):
     with pytest.raises(Cancelled):
         atlas.tabulate(template, progress=seen.append, should_stop=lambda: bool(seen))
     assert len(seen) == 1
-
-
-def test_the_volume_of_a_box():
-    box = trimesh.creation.box((2, 3, 4))
-    assert enclosed_volume(box.vertices + 5, box.faces) == pytest.approx(24)

@@ -36,7 +36,8 @@ def paper_sized(atlas: Atlas) -> Atlas:
             preset=dataclasses.replace(checkpoint.preset, network=network.config),
             weights=network.state_dict(),
             latents=np.pad(checkpoint.latents, [(0, 0), (0, padding)]),
-        )
+        ),
+        atlas.device,
     )
 
 

@@ -28,6 +28,7 @@ from naisr_model.errors import Cancelled, InputError
 from naisr_model.files import replacing
 from naisr_model.learning.objective import Batch, latent_term, population_terms, reconstruction_terms
 from naisr_model.learning.residual import covariate_basis
+from naisr_model.networks.devices import usable_device
 from naisr_model.networks.naisr import Naisr
 from naisr_model.surface.fields import template_field
 from naisr_model.surface.folding import folded_shares
@@ -219,10 +220,7 @@ def _task(store: SampleStore, preset: Preset, out: Path, budget_s: float, device
             f"the preset is for {preset.network.dim}D shapes and the store holds {store.frame.dim}D ones; "
             f"choose another preset"
         )
-    try:
-        torch.empty(1, device=device)
-    except (RuntimeError, AssertionError) as error:
-        raise InputError(f"torch cannot compute on '{device}' here; choose cpu, cuda or mps") from error
+    usable_device(device)
     rows = np.flatnonzero(~store.population.held_out)
     normalised = store.population.normalised()[rows]
     binary = tuple(i for i, c in enumerate(store.population.covariates) if c.kind == "binary")

@@ -11,7 +11,9 @@ The fields live at points of the *target* shape and point to the template.
 
 from __future__ import annotations
 
+import numpy as np
 import torch
+from numpy.typing import ArrayLike
 from torch import Tensor, nn
 
 from naisr_model.config import NetworkConfig
@@ -43,6 +45,10 @@ class Naisr(nn.Module):
     def device(self) -> torch.device:
         """Where the weights are."""
         return self.template_network.last_bias.device
+
+    def tensor(self, values: ArrayLike) -> Tensor:
+        """``values`` as the networks take them: in single precision, where the weights are."""
+        return torch.as_tensor(np.asarray(values, dtype=np.float32)).to(self.device)
 
     def template(self, points: Tensor) -> Tensor:
         """T, the template's signed distance, ``[shapes, n]``."""

@@ -45,9 +45,6 @@ SURVEY = 1 / 6
 CHUNK = 4096
 """Evaluations between two looks at ``should_stop``."""
 
-RECIPE = repr((SPACINGS, KNOT_COUNTS, TOLERANCE, PROBES, SURVEY))
-"""Tables of the same networks differ where this differs."""
-
 
 @dataclass(frozen=True, eq=False)
 class DisplacementTable:
@@ -169,23 +166,25 @@ class Displacements:
 
     def _of(self, index: int, value: float) -> Tensor:
         """g_i at all nodes; the last is kept, since most covariates stay where they are."""
-        if self._latest.get(index, (None,))[0] != value:
+        latest = self._latest.get(index)  # another thread may be about to replace it
+        if latest is None or latest[0] != value:
             (weights,) = _spline_weights(self._knots[index], np.array([value]))
             field = torch.tensordot(torch.from_numpy(weights), self._nodes[index], dims=1)
-            self._latest[index] = (value, field)
-        return self._latest[index][1]
+            self._latest[index] = latest = (value, field)
+        return latest[1]
 
 
-def sample(field: Tensor, lower: Tensor, points: Tensor) -> Tensor:
-    """A field on the finest lattice, ``[C, nz, ny, nx]``, linearly interpolated at points: ``[C, n]``.
+def sample(field: Tensor, lower: Tensor, points: Tensor, spacing: float = SPACINGS[-1]) -> Tensor:
+    """A field on a lattice, ``[C, nz, ny, nx]``, linearly interpolated at points: ``[C, n]``.
 
     Args:
         field: values at the nodes.
         lower: first node, (x, y, z) in model units.
         points: ``[3, n]`` model units; outside the lattice the value at its edge is taken.
+        spacing: between nodes, model units.
     """
     cells = torch.tensor(field.shape[:0:-1]) - 1  # along x, y, z
-    place = (points - lower[:, None]) * (2 / (SPACINGS[-1] * cells[:, None])) - 1
+    place = (points - lower[:, None]) * (2 / (spacing * cells[:, None])) - 1
     found = functional.grid_sample(
         field[None], place.T[None, None, None], padding_mode="border", align_corners=True
     )
@@ -295,7 +294,8 @@ def _spatial_error(
     """Largest error at the probes of a table of this spacing, at its own knots."""
     table = DisplacementTable(spacing, values, _nodes(field, region, spacing, values))
     fine = torch.from_numpy(_refined(table, region)).flatten(0, 1)
-    found = sample(fine, *(torch.as_tensor(part, dtype=torch.float32) for part in (region[0], probes.T)))
+    lower, places = (torch.as_tensor(part, dtype=torch.float32) for part in (region[0], probes.T))
+    found = sample(fine, lower, places)
     return float(np.abs(found.numpy().reshape(truth.shape) - truth).max())
 
 

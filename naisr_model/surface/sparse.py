@@ -7,6 +7,10 @@ changing sign is done; the nodes of the others are evaluated. The bound is measu
 meets is held against it, and where one breaks it the slack is raised and the walk repeated: what is
 known stays known, and only the halves that are now in question are evaluated. At last the surface is
 followed, cell by cell, wherever it leaves the evaluated cells.
+
+Where a guess of the field is at hand that costs next to nothing, the blocks are halved on the guess. The
+field itself is evaluated at the ends of the edges that the surface crosses, for only these place it, and
+where the guess is nearer to zero than it may err. How far it errs is measured wherever both are known.
 """
 
 from __future__ import annotations
@@ -33,6 +37,12 @@ COARSEST = 8
 
 LEAST_BLOCKS = 16
 """Blocks along a side of the box on the coarsest level, at least."""
+
+PROBED_BLOCKS = 8
+"""Blocks along a side of the box, at least, at whose corners a guess is held against the field."""
+
+LEAST_MISLED, MOST_MISLED = 0.5, 2.0
+"""Cells; a guess is taken to mislead by the one at least, and saves little where it does by the other."""
 
 KINK, SAFETY = 0.5, 1.5
 """A kink halfway between two samples is missed by half of their second difference (a parabola by an
@@ -64,8 +74,9 @@ def evaluate_band(
     lattice: Lattice,
     progress: Callable[[float], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
+    guess: Field | None = None,
 ) -> NDArray[np.float32]:
-    """The field at the nodes of all cells that hold its zero level set, and its sign elsewhere.
+    """The field at both ends of all edges that its zero level set crosses, and its sign elsewhere.
 
     A node that was not evaluated has the value infinity, minus infinity inside.
 
@@ -74,6 +85,7 @@ def evaluate_band(
         lattice: ``lattice.resolution`` must be a multiple of :data:`COARSEST`.
         progress: told the finished share.
         should_stop: polled between chunks.
+        guess: about the same, and much cheaper. It saves evaluations; one that proves wrong is put aside.
 
     Returns:
         Shape ``lattice.shape``.
@@ -82,14 +94,8 @@ def evaluate_band(
         Cancelled: when ``should_stop()`` turned true.
     """
     band = _Band(field, lattice, _Meter(progress), should_stop)
-    slack = LEAST_SLACK
-    walked = _walk(band, slack)
-    while walked.excess > 0:
-        slack += SAFETY * max(walked.excess, slack)
-        walked = _walk(band, slack)
-    _follow(band, walked.cells)
-    for size, blocks in walked.inside:
-        band.sink(blocks, size)
+    if guess is None or not _settle(band, _Band(guess, lattice, _Meter(None), should_stop)):
+        _search(band, LEAST_SLACK)
     band.meter.tell(1.0)
     return band.values
 
@@ -148,11 +154,15 @@ class _Band:
         places = self.places(cells, size * _offsets(self.lattice.dim, 2)).reshape(-1)
         places = _distinct(places[np.isinf(self.flat[places])])
         # Every level has about four times the points of the one before it.
-        before, all_of_it = self.meter.share, 1 / size**2
+        self.evaluate(places, 1 / size**2)
+
+    def evaluate(self, places: NDArray[np.intp], end: float) -> None:
+        """Evaluate the nodes at these places in the row; the meter is at ``end`` afterwards."""
+        begin = self.meter.share
         self.flat[places] = _chunked(
             self.field,
             self.lattice.points(self.nodes(places)),
-            lambda share: self.meter.tell(before + (all_of_it - before) * share),
+            lambda share: self.meter.tell(begin + (end - begin) * share),
             self.should_stop,
         )
 
@@ -162,6 +172,75 @@ class _Band:
         for some in np.array_split(blocks, 1 + len(blocks) * len(offsets) // MARKED_AT_ONCE):
             places = self.places(some, offsets).reshape(-1)
             self.flat[places[np.isinf(self.flat[places])]] = -np.inf
+
+
+def _settle(band: _Band, guess: _Band) -> bool:
+    """Evaluate the field where a guess does not tell its sign, and at both ends of all edges that it crosses.
+
+    Returns:
+        Whether that is enough. Where it is not, because the guess misleads by more than
+        :data:`MOST_MISLED`, what was evaluated stays known.
+    """
+    band.open(*_blocks(band.lattice, PROBED_BLOCKS))
+    doubt = 0.0
+    while (misled := _misled(band, guess)) > doubt:
+        doubt = SAFETY * misled
+        if misled > MOST_MISLED * band.lattice.spacing:
+            band.flat[np.isinf(band.flat)] = np.inf
+            return False
+        _search(guess, doubt)
+        unknown = np.isinf(band.flat)
+        band.flat[unknown] = np.inf
+        band.flat[unknown & (guess.flat < 0)] = -np.inf
+        near = np.flatnonzero(np.isfinite(guess.flat))
+        doubtful = near[np.abs(guess.flat[near]) <= doubt]
+        band.evaluate(doubtful[np.isinf(band.flat[doubtful])], 0.8)
+        _cross(band, near)
+    return True
+
+
+def _misled(band: _Band, guess: _Band) -> float:
+    """Up to which value, wherever the field is known, the guess promised too much.
+
+    It promises the field's sign, and a value half as far from zero as its own. Values farther from zero
+    mislead nobody: a guess may well be cut off far from the surface.
+    """
+    known = np.flatnonzero(np.isfinite(band.flat))
+    guess.evaluate(known[np.isinf(guess.flat[known])], 1.0)
+    signed = np.where(guess.flat[known] < 0, -band.flat[known], band.flat[known])
+    misled = float((np.abs(guess.flat[known]) - 2 * signed).max())
+    return max(LEAST_MISLED * band.lattice.spacing, misled)
+
+
+def _cross(band: _Band, places: NDArray[np.intp]) -> None:
+    """Evaluate both ends of the edges at these places on which the sign changes, and go on from there."""
+    while len(places):
+        places = _crossed(band, places)
+        places = places[np.isinf(band.flat[places])]
+        band.evaluate(places, 1.0)
+
+
+def _crossed(band: _Band, places: NDArray[np.intp]) -> NDArray[np.intp]:
+    """The ends of all edges at these places on which the sign changes."""
+    nodes, found = band.nodes(places), []
+    for axis, step in itertools.product(range(band.lattice.dim), (-1, 1)):
+        across = nodes[:, axis] + step
+        here = places[(across >= 0) & (across <= band.lattice.resolution)]
+        there = here + step * band.strides[axis]
+        crossed = (band.flat[here] < 0) != (band.flat[there] < 0)
+        found += [here[crossed], there[crossed]]
+    return _distinct(np.concatenate(found))
+
+
+def _search(band: _Band, slack: float) -> None:
+    """Evaluate the field wherever it can be zero, and mark the inside of the rest."""
+    walked = _walk(band, slack)
+    while walked.excess > 0:
+        slack += SAFETY * max(walked.excess, slack)
+        walked = _walk(band, slack)
+    _follow(band, walked.cells)
+    for size, blocks in walked.inside:
+        band.sink(blocks, size)
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,8 +260,8 @@ class _Walk:
 
 def _walk(band: _Band, slack: float) -> _Walk:
     """Halve blocks down to cells, leaving out what cannot hold the surface under this slack."""
-    dim, size = band.lattice.dim, _coarsest_size(band.lattice)
-    cells = Lattice(band.lattice.resolution // size - 1, dim).nodes() * size
+    dim = band.lattice.dim
+    cells, size = _blocks(band.lattice, LEAST_BLOCKS)
     bends = np.zeros(len(cells), np.float32)
     band.open(cells, size)
     inside, excess = [], 0.0
@@ -204,12 +283,12 @@ def _walk(band: _Band, slack: float) -> _Walk:
     return _Walk(cells, inside, excess)
 
 
-def _coarsest_size(lattice: Lattice) -> int:
-    """Cells along a side of the largest blocks: a power of two that divides the resolution."""
+def _blocks(lattice: Lattice, count: int) -> tuple[Cells, int]:
+    """Blocks that fill the box, at least ``count`` a side, and their size: a power of two."""
     size = 1
-    while lattice.resolution % (2 * size) == 0 and lattice.resolution // (2 * size) >= LEAST_BLOCKS:
+    while lattice.resolution % (2 * size) == 0 and lattice.resolution // (2 * size) >= count:
         size *= 2
-    return size
+    return Lattice(lattice.resolution // size - 1, lattice.dim).nodes() * size, size
 
 
 def _bends(band: _Band, cells: Cells, size: int) -> NDArray[np.float32]:
@@ -233,6 +312,22 @@ def _bends(band: _Band, cells: Cells, size: int) -> NDArray[np.float32]:
             second = np.abs(np.concatenate([before - 2 * low + high, low - 2 * high + after], axis=1))
         total += second.max(axis=1, initial=0.0, where=np.isfinite(second))
     return total
+
+
+def continued(values: NDArray[np.float32], lattice: Lattice) -> NDArray[np.float32]:
+    """What :func:`evaluate_band` gave, and halfway between known values their mean, level by level.
+
+    Near the zero level set that is as close as linear interpolation between neighbours.
+    """
+    values, (_, size) = values.copy(), _blocks(lattice, LEAST_BLOCKS)
+    while size > 1:
+        for axis in range(lattice.dim):
+            steps = [size // 2 if earlier <= axis else size for earlier in range(lattice.dim)]
+            level = np.moveaxis(values[tuple(slice(None, None, step) for step in steps)], axis, 0)
+            between, ends = level[1::2], level[::2]
+            np.copyto(between, (ends[:-1] + ends[1:]) / 2, where=np.isinf(between))
+        size //= 2
+    return values
 
 
 def _follow(band: _Band, cells: Cells) -> None:

@@ -6,6 +6,9 @@ A shape's surface is where T(p + d(p)) = 0, so the template's vertex q stands in
 
 With d tabulated this takes milliseconds, and every vertex keeps knowing its point of the template. Where
 p -> p + d(p) folds, a shape may hold more or other pieces than the template; that is looked for.
+
+With T tabulated too, the same d gives a guess of the shape's field that costs no network, by which its
+exact surface is found sooner.
 """
 
 from __future__ import annotations
@@ -28,6 +31,9 @@ from naisr_model.surface.displacements import (
     jacobian,
     sample,
 )
+from naisr_model.surface.fields import template_field
+from naisr_model.surface.lattice import Lattice
+from naisr_model.surface.sparse import Field, continued, evaluate_band
 
 RESOLVED = 0.02 * 2 / 128
 """Model units within which p + d(p) must meet q: a fiftieth of a voxel of 128^3."""
@@ -36,6 +42,9 @@ LONGEST_STEP = 4 * SPACINGS[-1]
 """Of Newton's method, in model units: further on, the derivative says little."""
 
 STEPS = 20
+
+TEMPLATE_LATTICE = Lattice(128)
+"""Where T is tabulated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +80,7 @@ class Tracker:
         displacements: tabulated, of the code.
         template_points: vertices q in model units, ``[3, n]``.
         template_slopes: gradients of T there, ``[3, n]``.
+        template_values: T at the nodes of a lattice over the box, ``[1, nz, ny, nx]``.
         faces: vertex numbers of the triangles, ``[m, 3]``; the same for every shape.
     """
 
@@ -79,6 +89,7 @@ class Tracker:
     displacements: Displacements
     template_points: Tensor
     template_slopes: Tensor
+    template_values: Tensor
     faces: NDArray[np.int64]
 
     def track(self, values: Values, start: Tracked | None = None) -> Tracked:
@@ -104,6 +115,26 @@ class Tracker:
         points_mm = self.frame.to_mm(_columns(points)).astype(np.float32)
         return Tracked(points_mm, _columns(normals), float((error > RESOLVED).float().mean()), folds)
 
+    def guess(self, values: Values) -> Field:
+        """T(p + d(p)) by interpolation: near the surface within a fraction of a voxel, and next to no work.
+
+        Args:
+            values: real values by name, as for :meth:`track`; the further out of range, the worse.
+
+        Raises:
+            InputError: for an unknown covariate.
+        """
+        vector = normalised_vector(self.covariates, complete(self.covariates, values, extrapolate=True))
+        displacement, lower = self.displacements.at(vector), self.displacements.lower
+
+        def field(points: NDArray[np.float32]) -> NDArray[np.float32]:
+            located = _rows(points)
+            landed = located + sample(displacement, lower, located)
+            found = sample(self.template_values, -torch.ones(3), landed, TEMPLATE_LATTICE.spacing)
+            return found[0].numpy()
+
+        return field
+
 
 def make_tracker(
     network: Naisr,
@@ -124,20 +155,16 @@ def make_tracker(
     points = torch.as_tensor(frame.to_model(template_mm.vertices), dtype=torch.float32, device=network.device)
     located = points[None].requires_grad_()
     (slopes,) = torch.autograd.grad(network.template(located).sum(), located)
+    values = continued(evaluate_band(template_field(network), TEMPLATE_LATTICE), TEMPLATE_LATTICE)
     return Tracker(
         covariates,
         frame,
         Displacements(tables),
         points.detach().T.cpu().contiguous(),
         slopes[0].T.cpu().contiguous(),
+        torch.from_numpy(values)[None],
         np.asarray(template_mm.faces, dtype=np.int64),
     )
-
-
-def enclosed_volume(points: NDArray[np.floating], faces: NDArray[np.integer]) -> float:
-    """Volume inside a closed surface, by the divergence theorem, in cubed units of ``points [n, 3]``."""
-    a, b, c = (points[faces[:, corner]].astype(np.float64) for corner in range(3))
-    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
 
 
 def _solve(field: Tensor, lower: Tensor, targets: Tensor, points: Tensor) -> tuple[Tensor, Tensor, Tensor]:
