@@ -20,6 +20,9 @@ Kind = Literal["continuous", "binary"]
 Values = Mapping[str, float]
 """Covariate values in real units by name; for a binary covariate -1 ... +1."""
 
+BANDWIDTH = 0.3
+"""Of the kernel that makes the growth path, in standard deviations of the covariate that moves."""
+
 
 @dataclass(frozen=True)
 class Covariate:
@@ -201,3 +204,35 @@ def complete(
 def normalised_vector(covariates: tuple[Covariate, ...], values: Values) -> NDArray[np.float64]:
     """Complete real ``values`` as the vector ``c``, ``[N]``."""
     return np.array([float(c.normalise(values[c.name])) for c in covariates])
+
+
+def growth_path(population: Population, name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Mean of every covariate given one of them, from the training rows by local linear regression.
+
+    Age and weight go together: a child of one year with the mean weight of the cohort does not exist.
+
+    Args:
+        population: its training rows are used.
+        name: the covariate that moves.
+        values: its real values, ``[n]``.
+
+    Returns:
+        Real values of all covariates in order, ``[n, N]``, inside the observed ranges.
+    """
+    column = population.names.index(name)
+    rows = population.normalised()[~population.held_out]
+    places = population.covariates[column].normalise(values)
+    path = np.stack([_local_mean(rows[:, column], rows, float(place)) for place in places])
+    path[:, column] = places
+    real = [c.restore(path[:, i]).clip(*c.range) for i, c in enumerate(population.covariates)]
+    return np.stack(real, axis=1)
+
+
+def _local_mean(given: NDArray[np.float64], rows: NDArray[np.float64], place: float) -> NDArray[np.float64]:
+    """Value at ``place`` of the straight lines fitted to ``rows [n, N]`` near it."""
+    offset = given - place
+    weights = np.exp(-0.5 * (offset / BANDWIDTH) ** 2) + 1e-9  # never all 0, far from the data either
+    design = np.stack([np.ones_like(offset), offset], axis=1)
+    ridge = np.diag([0.0, 1e-6 * weights.sum()])
+    solution = np.linalg.solve((design.T * weights) @ design + ridge, (design.T * weights) @ rows)
+    return np.asarray(solution[0])

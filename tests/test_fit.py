@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 
 import numpy as np
@@ -13,15 +14,15 @@ from eggs import egg
 from naisr_model import cli
 from naisr_model.atlas import Atlas
 from naisr_model.config import FitConfig, NetworkConfig, SirenConfig
+from naisr_model.covariates import growth_path
 from naisr_model.errors import Cancelled, InputError
-from naisr_model.evaluation.calibration import calibration_markdown
-from naisr_model.evaluation.evolution import along_only, evolution, growth_path, write_series
+from naisr_model.evaluation.evolution import along_only, evolution, write_series
 from naisr_model.evaluation.fitting import compare_fits, comparison_markdown
 from naisr_model.evaluation.reconstruction import HeldOut
 from naisr_model.learning import fit as fitting
 from naisr_model.learning.fit import STAGES, draw_sample, fit_shape
 from naisr_model.learning.least_squares import Descent, Problem, descend, evaluate, linearise
-from naisr_model.learning.prior import believed, conditional, prior_of
+from naisr_model.learning.prior import Prior, Told, believed, conditional, places_of, prior_of
 from naisr_model.learning.sensitivity import sensitivity
 from naisr_model.learning.target import target_of
 from naisr_model.networks.naisr import Naisr
@@ -37,6 +38,19 @@ def made(atlas):
     """A shape that the atlas makes itself, at known covariates and a known code."""
     values, code = {"age": 6.5, "sex": 1.0}, atlas.checkpoint.latents[3]
     return values, code, atlas.shape(values, code, 64)
+
+
+@pytest.fixture(scope="module")
+def prior(atlas) -> Prior:
+    return prior_of(atlas.population, atlas.checkpoint.latents)
+
+
+@pytest.fixture(scope="module")
+def lost(atlas, made, prior):
+    """A problem with the age to be found, far from its solution: problem, sample and parameters."""
+    problem = Problem(atlas.checkpoint.network(), prior, np.array([np.nan, 1.0]), 6.0)
+    sample = draw_sample(target_of(made[2], atlas.frame), 200, 0)
+    return problem, sample, problem.pack(prior.lowest, np.zeros(4))
 
 
 def test_derivatives_are_those_of_finite_differences():
@@ -78,6 +92,8 @@ def test_unknown_covariates_are_inferred_with_their_intervals(atlas):
     assert fit.covariates["sex"] == 1 and fit.intervals["sex"][1] == 1
     low, high = fit.volume_interval_cm3
     assert low < egg(7.0, 1.0).volume / 1000 < high
+    known_age = atlas.fit(egg(7.0, 1.0), {"age": 7.0})
+    assert set(known_age.intervals) == {"sex"} and known_age.covariates["sex"] == 1
     known_sex = atlas.fit(egg(7.0, 1.0), {"sex": 1.0})
     assert set(known_sex.intervals) == {"age"} and len(known_sex.alternatives) == 1
 
@@ -104,26 +120,18 @@ def test_far_off_points_are_not_followed(atlas, made):
     assert np.abs(atlas.sdf(shape.vertices, values, fit.latent)).mean() < 0.3
 
 
-def test_a_descent_never_goes_up_and_stays_in_range(atlas, made):
-    prior = prior_of(atlas.population, atlas.checkpoint.latents)
-    problem = Problem(atlas.checkpoint.network(), prior, np.array([np.nan, 1.0]), 6.0)
-    start = problem.pack(prior.lowest, np.zeros(4))
-    sample = draw_sample(target_of(made[2], atlas.frame), 200, 0)
+def test_a_descent_never_goes_up_and_stays_in_range(lost):
+    problem, sample, start = lost
     rows = evaluate(problem, sample, start)
-    noise = rows.noise
     end = descend(problem, sample, start, 6, None)
-    before = linearise(problem, rows, start, noise).objective
-    assert linearise(problem, end.rows, end.parameters, noise).objective < before
-    assert prior.lowest[0] <= end.parameters[0] <= prior.highest[0]
-    outside = np.full(5, 99.0)
-    assert problem.bounded(outside)[0] == prior.highest[0]
+    before = linearise(problem, rows, start, rows.noise).objective
+    assert linearise(problem, end.rows, end.parameters, rows.noise).objective < before
+    assert problem.prior.lowest[0] <= end.parameters[0] <= problem.prior.highest[0]
+    assert problem.bounded(np.full(5, 99.0))[0] == problem.prior.highest[0]
 
 
-def test_adam_helps_where_least_squares_stall(atlas, made):
-    prior = prior_of(atlas.population, atlas.checkpoint.latents)
-    problem = Problem(atlas.checkpoint.network(), prior, np.array([np.nan, 1.0]), 6.0)
-    start = problem.pack(prior.lowest, np.zeros(4))
-    sample = draw_sample(target_of(made[2], atlas.frame), 200, 0)
+def test_adam_helps_where_least_squares_stall(lost):
+    problem, sample, start = lost
     rows = evaluate(problem, sample, start)
     rescued = fitting._rescued(problem, sample, Descent(start, rows, 0, stalled=True), None)
     assert (
@@ -132,16 +140,21 @@ def test_adam_helps_where_least_squares_stall(atlas, made):
     )
 
 
-def test_a_fit_costs_few_evaluations(atlas, made):
-    prior = prior_of(atlas.population, atlas.checkpoint.latents)
+def test_a_fit_costs_few_evaluations(atlas, made, prior):
     target = target_of(made[2], atlas.frame)
     result = fit_shape(atlas.checkpoint.network(), target, prior, np.array([0.5, 1.0]))[0]
     # Levenberg-Marquardt takes some steps where the paper's procedure takes 800 of 750 points.
     assert result.evaluations <= 1.25 * 5 * sum(STAGES) < 0.05 * 800 * 750
 
 
-def test_covariates_are_believed_as_the_known_ones_suggest(atlas):
-    prior = prior_of(atlas.population, atlas.checkpoint.latents)
+def test_unknown_covariates_are_tried_all_over_the_population(lost):
+    ages = np.array([place[0] for place in fitting._places(lost[0])])
+    observed = lost[0].prior.training[:, 0]
+    assert len(ages) == fitting.STARTS and {observed.min(), observed.max()} <= set(ages)
+    assert np.diff(np.sort(ages)).max() < 0.5
+
+
+def test_covariates_are_believed_as_the_known_ones_suggest(prior):
     mean, precision = conditional(prior, np.array([np.nan, np.nan]))
     assert mean == pytest.approx(prior.mean) and np.linalg.inv(precision) == pytest.approx(prior.covariance)
     mean, precision = conditional(prior, np.array([np.nan, 1.0]))
@@ -150,16 +163,49 @@ def test_covariates_are_believed_as_the_known_ones_suggest(atlas):
     assert 1 / precision[0, 0] == pytest.approx(prior.covariance[0, 0] - slope * prior.covariance[0, 1])
 
 
-def test_the_population_itself_takes_the_place_of_its_gaussian(atlas):
-    prior = prior_of(atlas.population, atlas.checkpoint.latents)
+def told(mean: float, precision: float, place: float | None = None, log_height: float = 0.0) -> Told:
+    at = mean if place is None else place
+    return Told(np.array([at]), np.array([mean]), np.array([[precision]]), log_height)
+
+
+def test_the_population_itself_takes_the_place_of_its_gaussian(prior):
     fixed = np.array([np.nan, 1.0])
     # A shape that tells the age to a hundredth leaves nothing to the prior ...
-    mean, spread = believed(prior, fixed, np.array([0.4]), np.array([[1e4]]))
-    assert mean[0] == pytest.approx(0.4, abs=0.01) and spread[0, 0] == pytest.approx(1e-4, rel=0.1)
+    sure = believed(prior, fixed, [told(0.4, 1e4)])
+    assert sure.mean[0] == pytest.approx(0.4, abs=0.01)
+    assert sure.covariance[0, 0] == pytest.approx(1e-4, rel=0.1)
     # ... and one that tells nothing leaves all of it: the ages of those of this sex.
-    mean, spread = believed(prior, fixed, *conditional(prior, fixed))
+    mean, precision = conditional(prior, fixed)
+    unsure = believed(prior, fixed, [Told(mean, mean, precision, 0.0)])
     ages = prior.training[prior.training[:, 1] == 1, 0]
-    assert mean[0] == pytest.approx(ages.mean(), abs=0.2) and np.sqrt(spread[0, 0]) > ages.std()
+    assert unsure.mean[0] == pytest.approx(ages.mean(), abs=0.2)
+    assert np.sqrt(unsure.covariance[0, 0]) > ages.std()
+    # Ages are even from the youngest to the oldest, and so is what is believed of them.
+    ends = np.interp([0.025, 0.975], np.cumsum(unsure.densities[0]), places_of(prior, 0))
+    assert ends == pytest.approx(np.quantile(prior.training[:, 0], [0.025, 0.975]), abs=0.15)
+    assert unsure.densities.sum() == pytest.approx(1)
+
+
+def test_nobody_is_believed_to_be_beyond_the_observed_ages(prior):
+    belief = believed(prior, np.array([np.nan, 1.0]), [told(prior.highest[0] + 0.5, 4.0)])
+    assert belief.mean[0] < prior.highest[0] and belief.densities[0].argmax() > 400
+
+
+def test_what_is_told_elsewhere_counts_there(prior):
+    fixed, here = np.array([np.nan, 1.0]), told(-1.0, 25.0)
+    alone = believed(prior, fixed, [here])
+    both = believed(prior, fixed, [here, told(1.0, 2.0, log_height=-1.0)])
+    assert alone.densities[0][-200:].sum() < 1e-3 < 0.05 < both.densities[0][-200:].sum()
+    assert both.log_gain > alone.log_gain
+
+
+def test_what_is_unsure_of_a_person_hardly_shows_on_the_person_s_own_shape(atlas):
+    person = atlas.fit(egg(7.0, 1.0)).individual
+    as_elsewhere = dataclasses.replace(person.posterior, along=person.posterior.covariance)
+    vertices = person.surface.vertices[::50]
+    own = person.surface_sd_mm(vertices)
+    assert (own < dataclasses.replace(person, posterior=as_elsewhere).surface_sd_mm(vertices)).all()
+    assert (own > person.posterior.noise * atlas.frame.scale_mm).all()
 
 
 def test_bad_patients_get_a_sentence(atlas):
@@ -193,7 +239,7 @@ def test_the_person_at_other_covariates(atlas, made):
     low, high = older.volume_interval_cm3
     assert low < older.volume_cm3 < high
     surface = older.shape(32)
-    deviations = older.surface_sd_mm(surface)
+    deviations = older.surface_sd_mm(surface.vertices)
     assert deviations.shape == (len(surface.vertices),) and (deviations > 0).all()
     with pytest.raises(InputError, match="99 years"):
         fit.at({"age": 99})
@@ -223,16 +269,6 @@ def test_evolution_and_its_files(atlas, made, tmp_path):
     table.write_text("height\n3\n")
     with pytest.raises(InputError, match="unknown covariate 'height'"):
         evolution(fit, "age", None, None, 1, str(table))
-
-
-def test_a_calibration_is_told_in_a_table():
-    volume = {"coverage": 0.95, "width": 2.0, "error": 0.5, "unit": "cm³"}
-    rows = {"volume": volume, "age": volume | {"coverage": 1.0}}
-    rows["sex"] = {"coverage": 1.0, "undecided": 0.6, "wrong": 0.4}
-    text = calibration_markdown({"n": 7, "known": [], "rows": rows})
-    assert "7 new patients" in text and "| volume | 95.0% | 2 cm³ | 0.5 cm³ | yes |" in text
-    assert "| age | 100.0% | 2 cm³ | 0.5 cm³ | no |" in text
-    assert "| sex | 100.0% | 60% undecided | 40% wrong | yes |" in text
 
 
 def test_the_fast_fit_is_compared_with_the_paper_s(atlas, made):

@@ -14,16 +14,13 @@ import pyvista as pv
 from numpy.typing import NDArray
 
 from naisr_model.atlas import Atlas, Fit, Individual
-from naisr_model.covariates import Population, complete
+from naisr_model.covariates import complete, growth_path
 from naisr_model.errors import Cancelled, InputError
 from naisr_model.files import replacing
 from naisr_model.learning.posterior import moved
 
 Progress = Callable[[float], None]
 StopCheck = Callable[[], bool]
-
-BANDWIDTH = 0.3
-"""Of the kernel that makes the growth path, in standard deviations of the covariate that moves."""
 
 PIXELS = 400
 
@@ -42,38 +39,6 @@ def fit_record(fit: Fit) -> dict[str, Any]:
         "seconds": fit.seconds,
         "latent": fit.latent.tolist(),
     }
-
-
-def growth_path(population: Population, name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Mean of every covariate given one of them, from the training rows by local linear regression.
-
-    Age and weight go together: a child of one year with the mean weight of the cohort does not exist.
-
-    Args:
-        population: its training rows are used.
-        name: the covariate that moves.
-        values: its real values, ``[n]``.
-
-    Returns:
-        Real values of all covariates in order, ``[n, N]``, inside the observed ranges.
-    """
-    column = population.names.index(name)
-    rows = population.normalised()[~population.held_out]
-    places = population.covariates[column].normalise(values)
-    path = np.stack([_local_mean(rows[:, column], rows, float(place)) for place in places])
-    path[:, column] = places
-    real = [c.restore(path[:, i]).clip(*c.range) for i, c in enumerate(population.covariates)]
-    return np.stack(real, axis=1)
-
-
-def _local_mean(given: NDArray[np.float64], rows: NDArray[np.float64], place: float) -> NDArray[np.float64]:
-    """Value at ``place`` of the straight lines fitted to ``rows [n, N]`` near it."""
-    offset = given - place
-    weights = np.exp(-0.5 * (offset / BANDWIDTH) ** 2) + 1e-9  # never all 0, far from the data either
-    design = np.stack([np.ones_like(offset), offset], axis=1)
-    ridge = np.diag([0.0, 1e-6 * weights.sum()])
-    solution = np.linalg.solve((design.T * weights) @ design + ridge, (design.T * weights) @ rows)
-    return np.asarray(solution[0])
 
 
 def evolution(

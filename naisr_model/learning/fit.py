@@ -18,9 +18,18 @@ from torch import Tensor
 
 from naisr_model.config import FitConfig, LossWeights
 from naisr_model.errors import Cancelled
-from naisr_model.learning.least_squares import Descent, Problem, Sample, descend, evaluate, linearise
+from naisr_model.learning.least_squares import (
+    TOLERATED,
+    Descent,
+    Linearised,
+    Problem,
+    Sample,
+    descend,
+    evaluate,
+    linearise,
+)
 from naisr_model.learning.objective import Batch, latent_term, reconstruction_terms
-from naisr_model.learning.prior import Prior, believed
+from naisr_model.learning.prior import Prior, Told, believed
 from naisr_model.learning.target import Target
 from naisr_model.networks.naisr import Naisr
 
@@ -31,16 +40,32 @@ StopCheck = Callable[[], bool]
 STAGES, MOST_STEPS = (256, 512, 768), 4
 """Surface points of each stage, freshly drawn and from coarse to fine, and its most steps."""
 
-STARTS = 5
-"""Places along the population at which unknown covariates are tried."""
+DRAWN_IN = (4 * TOLERATED, 2 * TOLERATED, TOLERATED)
+"""k of each stage where all covariates are known: a limb that is off by its own width is first drawn in; at
+once held for something that the atlas does not know, it would stay where it is."""
+
+STARTS, PLACING_POINTS, PURSUED = 12, 128, 3
+"""Places over the population at which unknown covariates are tried, on so many surface points, and how many
+of the best are pursued: a big child and a small adult are both good explanations until one looks closer."""
+
+HOPELESS = 25.0
+"""Twice the log odds against an explanation at which it is pursued no further."""
+
+APART = 4.0
+"""Squared distance of the covariates, in standard deviations, from which on two explanations are two."""
 
 SPACE_SHARE = 0.25
 """Points off the surface for each one on it, where the target says what is inside: they keep the shape from
 turning inside out and surfaces away that the patient does not have."""
 
+SHARES = (-2.0, -1.0, 1.0, 2.0)
+"""Standard deviations from the fit, along each axis, at which the shape is asked again what it tells."""
+
 INDEPENDENT_POINTS = 5.0
-"""M for what is inferred with its uncertainty, see :mod:`~naisr_model.learning.least_squares`. Found by
-calibration: ``naisr evaluate calibration`` prints how often the intervals hold the truth."""
+"""M for what is inferred with its uncertainty, see :mod:`~naisr_model.learning.least_squares`: so few because
+what the atlas cannot express looks like a change of covariates over the whole shape. Chosen over 60 synthetic
+patients of each shipped atlas, of other seeds than those of the training and of ``naisr evaluate
+calibration``, which counts how often the intervals hold the truth."""
 
 FOLLOWED_POINTS = 500.0
 """M for the code once the covariates are settled: the fitted surface should follow the patient's more
@@ -48,6 +73,9 @@ closely than one would bet on the code."""
 
 RESCUE_STEPS, RESCUE_RATE = 60, 0.05
 """Adam steps, in standard deviations of the prior, where least squares stall."""
+
+Explanation = tuple[Problem, Descent]
+"""What is given of the covariates, and where a descent on the rest ended."""
 
 Draw = Callable[[np.random.Generator], Batch]
 """Fresh samples of all shapes that are fitted together."""
@@ -117,6 +145,7 @@ class ShapeFit:
         latent: the code z, ``[L]``.
         free: columns of the covariates that were inferred from continuous values.
         spread: covariance of those, ``[F, F]``.
+        densities: of each over its observed range, see :class:`~naisr_model.learning.prior.Belief`.
         surprise: twice the negative log evidence, comparable between the fits of one shape.
         noise: robust standard deviation of the distances at surface points, model units.
         evaluations: points at which the networks were evaluated.
@@ -126,6 +155,7 @@ class ShapeFit:
     latent: Vector
     free: NDArray[np.intp]
     spread: Vector
+    densities: Vector
     surprise: float
     noise: float
     evaluations: int
@@ -156,7 +186,7 @@ def fit_shape(
         should_stop: polled before every step.
 
     Returns:
-        A fit for each combination of the unknown binary covariates' levels, the best first.
+        A fit for each explanation that differs in its covariates, the best first.
 
     Raises:
         Cancelled: when ``should_stop()`` turned true.
@@ -164,31 +194,85 @@ def fit_shape(
     samples = [draw_sample(target, points, stage) for stage, points in enumerate(STAGES)]
     if not np.isnan(known).any():
         problem = Problem(network, prior, known, FOLLOWED_POINTS)
-        descent = _descend(problem, samples, np.zeros(len(prior.code_root)), should_stop, progress)
-        return [_result(problem, descent, descent.rows.noise)]
-    settled: list[tuple[Problem, Descent]] = []
-    combinations = _combinations(known, binary)
-    for number, fixed in enumerate(combinations):
-        problem = Problem(network, prior, fixed, INDEPENDENT_POINTS)
-        told = _part(progress, number, len(combinations) + 1)
-        start = _start(problem, samples[0])
-        settled.append((problem, _descend(problem, samples, start, should_stop, told)))
+        problems = [dataclasses.replace(problem, tolerated=tolerated) for tolerated in DRAWN_IN]
+        descent = _descend(problems, samples, np.zeros(len(prior.code_root)), should_stop, progress)
+        return [_result(problem, descent, descent.rows.noise, samples[0])]
+    begun = _begun(network, target, prior, _combinations(known, binary), should_stop, progress)
+    settled: list[Explanation] = []
+    pursued = _different(begun)
+    for number, (followed, descent) in enumerate(pursued):
+        problem, told = _weighed(followed), _part(progress, len(pursued) + number, 3 * len(pursued))
+        settled.append((problem, _descend([problem] * 2, samples[1:], descent.parameters, should_stop, told)))
     noise = min(descent.rows.noise for _, descent in settled)
-    fits = sorted((_result(*one, noise) for one in settled), key=lambda fit: fit.surprise)
-    told = _part(progress, len(combinations), len(combinations) + 1)
-    return [_followed(network, prior, fits[0], samples[-1], should_stop, told), *fits[1:]]
+    fits = sorted(
+        (_result(*one, noise, samples[0]) for one in _different(settled)), key=lambda fit: fit.surprise
+    )
+    best = _followed(network, prior, fits[0], samples[-1], should_stop, _part(progress, 2, 3))
+    asked = len(fits) * (1 + len(SHARES) * len(fits[0].free)) * len(samples[0].points)
+    spent = sum(descent.evaluations for _, descent in begun + settled) + best.evaluations + asked
+    return [dataclasses.replace(best, evaluations=spent), *fits[1:]]
+
+
+def _begun(
+    network: Naisr,
+    target: Target,
+    prior: Prior,
+    combinations: Sequence[Vector],
+    should_stop: StopCheck | None,
+    progress: Progress | None,
+) -> list[Explanation]:
+    """Where descents on the coarsest sample lead from the best places of each combination.
+
+    They follow the surface closely: with a say as small as that of the inference a bad start would pass
+    its own residuals off as noise. A third of the work.
+    """
+    placing, coarse = draw_sample(target, PLACING_POINTS, 0), draw_sample(target, STAGES[0], 0)
+    found: list[Explanation] = []
+    for number, fixed in enumerate(combinations, start=1):
+        problem = Problem(network, prior, fixed, FOLLOWED_POINTS)
+        for start in _starts(problem, placing):
+            found.append((problem, _descend([problem], [coarse], start, should_stop, None)))
+        if progress is not None:
+            progress(number / (3 * len(combinations)))
+    return found
+
+
+def _weighed(problem: Problem) -> Problem:
+    """The same unknowns, the surface counting for as much as one can bet on."""
+    return dataclasses.replace(problem, independent=INDEPENDENT_POINTS)
+
+
+def _different(found: Sequence[Explanation]) -> list[Explanation]:
+    """The explanations worth pursuing, the best first, and of those that are alike only the best."""
+    noise = min(descent.rows.noise for _, descent in found)
+    ends = [linearise(_weighed(problem), end.rows, end.parameters, noise) for problem, end in found]
+    least = [end.objective - end.gradient @ np.linalg.solve(end.hessian, end.gradient) for end in ends]
+    kept: list[int] = []
+    for number in map(int, np.argsort(least)):
+        alike = (_alike(found[number], found[other], ends[other]) for other in kept)
+        if not kept or (least[number] < least[kept[0]] + HOPELESS and not any(alike)):
+            kept.append(number)
+    return [found[number] for number in kept]
+
+
+def _alike(one: Explanation, other: Explanation, end: Linearised) -> bool:
+    count = len(one[0].free)
+    if not np.array_equal(one[0].fixed, other[0].fixed, equal_nan=True):
+        return False
+    offset = one[1].parameters[:count] - other[1].parameters[:count]
+    return bool(offset @ np.linalg.solve(np.linalg.inv(end.hessian)[:count, :count], offset) < APART)
 
 
 def _descend(
-    problem: Problem,
+    problems: Sequence[Problem],
     samples: Sequence[Sample],
     parameters: Vector,
     should_stop: StopCheck | None,
     progress: Progress | None,
 ) -> Descent:
-    """From sample to sample; what is told as evaluations counts all of them."""
+    """From sample to sample, each with its problem; what is told as evaluations counts all of them."""
     spent = 0
-    for done, sample in enumerate(samples, start=1):
+    for done, (problem, sample) in enumerate(zip(problems, samples, strict=True), start=1):
         descent = descend(problem, sample, parameters, MOST_STEPS, should_stop)
         if descent.stalled:
             descent = _rescued(problem, sample, descent, should_stop)
@@ -198,25 +282,68 @@ def _descend(
     return dataclasses.replace(descent, evaluations=spent)
 
 
-def _result(problem: Problem, descent: Descent, noise: float) -> ShapeFit:
+def _result(problem: Problem, descent: Descent, noise: float, sample: Sample) -> ShapeFit:
     """With the evidence by Laplace's approximation, log p(points) = -(E + log det A) / 2 + constant.
 
-    The prior of the free covariates is changed from a Gaussian to the population itself; the code
-    follows the covariates along the valley of the objective.
+    The prior of the free covariates is changed from a Gaussian to the population itself, and what the
+    shape says of them is asked at some places about the fit on ``sample``; the code follows the covariates
+    along the valley of the objective.
     """
     end = linearise(problem, descent.rows, descent.parameters, noise)
     surprise = end.objective + float(np.linalg.slogdet(end.hessian)[1])
     count, parameters = len(problem.free), descent.parameters.copy()
-    spread = np.zeros((count, count))
+    spread, densities = np.zeros((count, count)), np.zeros((count, 0))
     if count:
-        precision = np.linalg.inv(np.linalg.inv(end.hessian)[:count, :count])
-        mean, spread = believed(problem.prior, problem.fixed, parameters[:count], precision)
-        along = np.linalg.solve(end.hessian[count:, count:], end.hessian[count:, :count])
-        parameters[count:] -= along @ (mean - parameters[:count])
-        parameters[:count] = mean
+        slopes = np.linalg.solve(end.hessian[count:, count:], end.hessian[count:, :count])
+        along = np.asarray(slopes, dtype=np.float64)
+        here = _told(problem, sample, parameters, noise)
+        spread = believed(problem.prior, problem.fixed, [here]).covariance
+        there = [
+            _told(problem, sample, _shifted(problem, parameters, along, offset), noise)
+            for offset in _offsets(spread)
+        ]
+        belief = believed(problem.prior, problem.fixed, [here, *there])
+        spread, densities, surprise = belief.covariance, belief.densities, surprise - 2 * belief.log_gain
+        parameters = _shifted(problem, parameters, along, belief.mean - parameters[:count])
     covariates, latent = problem.unpack(parameters)
-    evaluations = descent.evaluations
-    return ShapeFit(covariates, latent, problem.free, spread, surprise, descent.rows.noise, evaluations)
+    return ShapeFit(
+        covariates=covariates,
+        latent=latent,
+        free=problem.free,
+        spread=spread,
+        densities=densities,
+        surprise=surprise,
+        noise=descent.rows.noise,
+        evaluations=descent.evaluations,
+    )
+
+
+def _offsets(spread: Vector) -> list[Vector]:
+    """Along each principal axis, to both sides."""
+    values, axes = np.linalg.eigh(spread)
+    steps = axes * np.sqrt(values)
+    return [share * step for step in steps.T for share in SHARES]
+
+
+def _shifted(problem: Problem, parameters: Vector, along: Vector, offset: Vector) -> Vector:
+    """Other covariates, the code following them down the valley of the objective."""
+    count, result = len(offset), parameters.copy()
+    result[:count] += offset
+    result = problem.bounded(result)
+    result[count:] -= along @ (result[:count] - parameters[:count])
+    return result
+
+
+def _told(problem: Problem, sample: Sample, parameters: Vector, noise: float) -> Told:
+    """What the shape says of the covariates near ``parameters``, whatever the code is."""
+    count = len(problem.free)
+    near = linearise(problem, evaluate(problem, sample, parameters), parameters, noise)
+    covariance = np.linalg.inv(near.hessian)
+    step = -covariance @ near.gradient
+    log_height = -0.5 * (near.objective + float(near.gradient @ step))
+    log_height -= 0.5 * float(np.linalg.slogdet(near.hessian[count:, count:])[1])
+    place = parameters[:count]
+    return Told(place, place + step[:count], np.linalg.inv(covariance[:count, :count]), log_height)
 
 
 def _followed(
@@ -230,10 +357,9 @@ def _followed(
     """The code moved closer to the surface, the covariates staying where they were inferred."""
     problem = Problem(network, prior, fit.covariates, FOLLOWED_POINTS)
     start = problem.pack(fit.covariates, fit.latent)
-    descent = _descend(problem, [sample], start, should_stop, progress)
+    descent = _descend([problem], [sample], start, should_stop, progress)
     latent = problem.unpack(descent.parameters)[1]
-    spent = fit.evaluations + descent.evaluations
-    return dataclasses.replace(fit, latent=latent, noise=descent.rows.noise, evaluations=spent)
+    return dataclasses.replace(fit, latent=latent, noise=descent.rows.noise, evaluations=descent.evaluations)
 
 
 def _part(progress: Progress | None, number: int, parts: int) -> Progress | None:
@@ -262,24 +388,28 @@ def _combinations(known: Vector, binary: Sequence[int]) -> list[Vector]:
     return result
 
 
-def _start(problem: Problem, sample: Sample) -> Vector:
-    """The most probable of some places along the population, the code being 0."""
+def _starts(problem: Problem, sample: Sample) -> list[Vector]:
+    """The most probable of some places over the population, the code being 0; the best first."""
     places = [np.concatenate([place, np.zeros(len(problem.prior.code_root))]) for place in _places(problem)]
     rows = [evaluate(problem, sample, place) for place in places]
     noise = min(one.noise for one in rows)
     scores = [linearise(problem, *pair, noise).objective for pair in zip(rows, places, strict=True)]
-    return places[int(np.argmin(scores))]
+    return [places[number] for number in np.argsort(scores)[:PURSUED]]
 
 
 def _places(problem: Problem) -> list[Vector]:
-    """Free covariates of training rows, evenly along the direction in which these vary most."""
+    """Free covariates of training rows: one in the middle, then always the farthest from those before."""
     free = problem.free
     if not len(free):
         return [np.zeros(0)]
     rows = problem.prior.training[:, free]
-    main = np.linalg.eigh(np.atleast_2d(np.cov(rows, rowvar=False)))[1][:, -1]
-    order = np.argsort(rows @ main)
-    return list(rows[order[np.linspace(0, len(rows) - 1, STARTS + 2).round().astype(int)[1:-1]]])
+    distances = np.linalg.norm(rows - problem.prior.mean[free], axis=1)
+    chosen = [int(distances.argmin())]
+    nearest = np.linalg.norm(rows - rows[chosen[0]], axis=1)
+    while len(chosen) < STARTS and nearest.max() > 0:
+        chosen.append(int(nearest.argmax()))
+        nearest = np.minimum(nearest, np.linalg.norm(rows - rows[chosen[-1]], axis=1))
+    return list(rows[chosen])
 
 
 def _rescued(problem: Problem, sample: Sample, descent: Descent, should_stop: StopCheck | None) -> Descent:

@@ -60,12 +60,14 @@ class Problem:
         prior: of codes and covariates.
         fixed: centred values of the covariates that do not move, NaN for the free ones, ``[N]``.
         independent: M, how many independent measurements the surface counts for.
+        tolerated: k, see :data:`TOLERATED`.
     """
 
     network: Naisr
     prior: Prior
     fixed: Vector
     independent: float
+    tolerated: float = TOLERATED
 
     @property
     def free(self) -> NDArray[np.intp]:
@@ -140,7 +142,7 @@ def evaluate(problem: Problem, sample: Sample, parameters: Vector) -> Rows:
 def linearise(problem: Problem, rows: Rows, parameters: Vector, noise: float) -> Linearised:
     """E and its derivatives at ``parameters [P]`` for residuals of standard deviation ``noise``."""
     residuals, jacobian, _ = rows
-    squared = (residuals / (TOLERATED * noise)) ** 2
+    squared = (residuals / (problem.tolerated * noise)) ** 2
     share = problem.independent / (len(residuals) * noise**2)
     weighted = jacobian.T * (share / (1 + squared) ** 2)
     offset, precision = _prior_terms(problem, parameters)

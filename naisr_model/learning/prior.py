@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +31,7 @@ class Prior:
         lowest: smallest observed centred covariates, ``[N]``.
         highest: largest ones, ``[N]``.
         training: centred covariates of the training rows, ``[n_train, N]``.
+        change: variance of a whitened code, along each axis, between two visits of one person.
     """
 
     code_root: NDArray[np.float64]
@@ -37,20 +40,36 @@ class Prior:
     lowest: NDArray[np.float64]
     highest: NDArray[np.float64]
     training: NDArray[np.float64]
+    change: float
 
 
 def prior_of(population: Population, latents: NDArray[np.float32]) -> Prior:
     """The prior of a population and its training codes ``[n_train, L]``."""
     rows = population.normalised()[~population.held_out]
     bounds = np.array([c.normalise(c.range) for c in population.covariates])
+    root = _root(latents.astype(np.float64))
+    subjects = np.array(population.subjects)[~population.held_out]
     return Prior(
-        code_root=_root(latents.astype(np.float64)),
+        code_root=root,
         mean=rows.mean(axis=0),
         covariance=np.atleast_2d(np.cov(rows, rowvar=False)) + 1e-6 * np.eye(rows.shape[1]),
         lowest=bounds[:, 0],
         highest=bounds[:, 1],
         training=rows,
+        change=_change(np.asarray(np.linalg.solve(root, latents.T).T, np.float64), subjects),
     )
+
+
+def _change(codes: NDArray[np.float64], subjects: NDArray[np.str_]) -> float:
+    """Mean square of the difference of two visits' whitened codes ``[n, L]``, along each axis.
+
+    Where nobody was seen twice, nothing is known of how long a code lasts: then it is that of strangers.
+    """
+    first, second = np.triu_indices(len(codes), 1)
+    same = subjects[first] == subjects[second]
+    if same.any():
+        return float(np.mean((codes[first[same]] - codes[second[same]]) ** 2))
+    return 2 * float(np.mean(codes**2))
 
 
 def _root(latents: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -75,48 +94,126 @@ NEIGHBOURS = 20
 NARROWEST = 0.03
 """Least standard deviation of a kernel, in those of the covariates."""
 
+GRID = 512
+"""Values of a covariate, evenly over its observed range, at which densities are tabulated."""
 
-def believed(
-    prior: Prior, fixed: NDArray[np.float64], mean: NDArray[np.float64], precision: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+
+@dataclass(frozen=True, eq=False)
+class Belief:
+    """What is known of the free covariates of one shape.
+
+    Attributes:
+        mean: inside the observed ranges, ``[F]``.
+        covariance: ``[F, F]``.
+        densities: of each by itself, over the observed range, with sum 1, ``[F, GRID]``.
+        log_gain: logarithm of the evidence with the population as the prior over that with its Gaussian.
+    """
+
+    mean: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    densities: NDArray[np.float64]
+    log_gain: float
+
+
+def places_of(prior: Prior, column: int) -> NDArray[np.float64]:
+    """The centred values that densities of a covariate are tabulated at, ``[GRID]``."""
+    return np.linspace(prior.lowest[column], prior.highest[column], GRID)
+
+
+class Told(NamedTuple):
+    """What a shape says of its free covariates near one place: a Gaussian, the Gaussian prior included.
+
+    ``log_height`` is the logarithm of its maximum, comparable between the places of one shape.
+    """
+
+    place: NDArray[np.float64]
+    mean: NDArray[np.float64]
+    precision: NDArray[np.float64]
+    log_height: float
+
+
+def believed(prior: Prior, fixed: NDArray[np.float64], told: Sequence[Told]) -> Belief:
     """What is known of the free covariates when the Gaussian prior gives way to the population itself.
 
     Covariates go together in ways that one Gaussian does not tell: infants weigh alike, adolescents do
     not. The Gaussian of :func:`conditional` is divided out of the posterior and a kernel density of
-    the training rows, each kernel as wide as the row's neighbourhood, multiplied in; the result, a
-    mixture of Gaussians, is described by its mean and covariance.
+    the training rows, each kernel as wide as the row's neighbourhood, multiplied in; the result is a
+    mixture of Gaussians, cut off where the observed ranges end. Nor does one Gaussian tell what a shape
+    says of covariates far from the best ones, so each row takes what is told at the place nearest to it.
 
     Args:
         prior: with the training rows.
         fixed: centred covariates, NaN for the free ones, ``[N]``.
-        mean: of the posterior of the free covariates under the Gaussian prior, ``[F]``.
-        precision: of that posterior, ``[F, F]``.
-
-    Returns:
-        Mean ``[F]``, inside the observed ranges, and covariance ``[F, F]``.
+        told: what the shape says, the place of the fit first.
     """
-    prior_mean, prior_precision = conditional(prior, fixed)
-    told = precision - prior_precision
-    pull = precision @ mean - prior_precision @ prior_mean
-    means, covariances, logs = [], [], []
-    for row in prior.training:
-        centre, kernel, log_weight = _kernel_given(prior, fixed, row)
-        inverse = np.linalg.inv(kernel)
-        covariance = np.linalg.inv(told + inverse)
-        peak = covariance @ (pull + inverse @ centre)
-        # log of the integral of kernel times likelihood, up to what all rows share
-        exponent = peak @ (told + inverse) @ peak - centre @ inverse @ centre
-        determinants = np.linalg.slogdet(covariance)[1] - np.linalg.slogdet(kernel)[1]
-        means.append(peak)
-        covariances.append(covariance)
-        logs.append(log_weight + 0.5 * (exponent + determinants))
-    weights = np.exp(np.array(logs) - max(logs))
-    weights /= weights.sum()
-    centre = weights @ np.array(means)
-    offsets = np.array(means) - centre
-    spread = np.einsum("k,kij->ij", weights, np.array(covariances)) + (offsets.T * weights) @ offsets
-    free = np.isnan(fixed)
-    return np.clip(centre, prior.lowest[free], prior.highest[free]), spread
+    free, prior_mean, prior_precision = np.flatnonzero(np.isnan(fixed)), *conditional(prior, fixed)
+    kernels = [_kernel_given(prior, fixed, row) for row in prior.training]
+    places = np.array([one.place for one in told])
+    parts = []
+    for centre, kernel, log_weight in kernels:
+        offsets = places - centre
+        distances = np.einsum("pi,ij,pj->p", offsets, told[0].precision, offsets)
+        parts.append(
+            _weighted(told[int(distances.argmin())], prior_mean, prior_precision, centre, kernel, log_weight)
+        )
+    means, covariances = (np.array([part[i] for part in parts]) for i in range(2))
+    logs = np.array([part[2] for part in parts])
+    log_sum = float(np.logaddexp.reduce(logs))
+    weights = np.exp(logs - log_sum)
+    prior_covariance = np.asarray(np.linalg.inv(prior_precision), dtype=np.float64)
+    gaussian = _weighted(told[0], prior_mean, prior_precision, prior_mean, prior_covariance, 0.0)[2]
+    densities = _marginals(prior, free, weights, means, covariances)
+    middle = np.array([d @ places_of(prior, int(i)) for d, i in zip(densities, free, strict=True)])
+    offsets = means - weights @ means
+    spread = np.einsum("k,kij->ij", weights, covariances) + (offsets.T * weights) @ offsets
+    return Belief(middle, spread, densities, log_sum - gaussian)
+
+
+def _weighted(
+    told: Told,
+    prior_mean: NDArray[np.float64],
+    prior_precision: NDArray[np.float64],
+    centre: NDArray[np.float64],
+    kernel: NDArray[np.float64],
+    log_weight: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Mean, covariance and log integral of what is told, without the Gaussian prior, times a kernel."""
+    precision = told.precision - prior_precision
+    pull = told.precision @ told.mean - prior_precision @ prior_mean
+    at_zero = prior_mean @ prior_precision @ prior_mean - told.mean @ told.precision @ told.mean
+    return _product(precision, pull, centre, kernel, log_weight + told.log_height + 0.5 * float(at_zero))
+
+
+def _product(
+    told: NDArray[np.float64],
+    pull: NDArray[np.float64],
+    centre: NDArray[np.float64],
+    kernel: NDArray[np.float64],
+    log_weight: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Mean, covariance and log integral of exp(-x told x / 2 + pull x) times a weighted Gaussian kernel."""
+    inverse = np.linalg.inv(kernel)
+    covariance = np.linalg.inv(told + inverse)
+    peak = covariance @ (pull + inverse @ centre)
+    exponent = peak @ (told + inverse) @ peak - centre @ inverse @ centre
+    determinants = np.linalg.slogdet(covariance)[1] - np.linalg.slogdet(kernel)[1]
+    return peak, covariance, log_weight + 0.5 * float(exponent + determinants)
+
+
+def _marginals(
+    prior: Prior,
+    free: NDArray[np.intp],
+    weights: NDArray[np.float64],
+    means: NDArray[np.float64],
+    covariances: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Densities of each covariate of a mixture of Gaussians on its grid, ``[F, GRID]``."""
+    result = np.zeros((len(free), GRID))
+    for number, column in enumerate(free):
+        deviations = np.sqrt(covariances[:, number, number])
+        scores = (places_of(prior, column) - means[:, number, None]) / deviations[:, None]
+        result[number] = (weights / deviations) @ np.exp(-0.5 * scores**2) + 1e-300
+    return result / result.sum(axis=1, keepdims=True)
 
 
 def _kernel_given(
