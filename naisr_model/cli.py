@@ -152,6 +152,7 @@ def mesh(
     template: bool = False,
     resolution: int = 128,
     extrapolate: bool = False,
+    device: str = "cpu",
 ) -> None:
     """Write one surface of an atlas in millimetres (STL, PLY, OBJ or GLB by the file's name).
 
@@ -163,6 +164,7 @@ def mesh(
         template: write the template.
         resolution: cells along a side of the box, a multiple of 8.
         extrapolate: allow values outside the observed range.
+        device: where the networks are evaluated: cpu, cuda or mps.
     """
     from naisr_model.atlas import Atlas
     from naisr_model.files import replacing
@@ -171,7 +173,7 @@ def mesh(
         raise InputError(f"cannot write '{out.suffix}'; name the file .stl, .ply, .obj or .glb")
     if template and (effect is not None or set):
         raise InputError("the template depends on no covariate; leave out --effect and --set")
-    loaded = Atlas.load(atlas)
+    loaded = Atlas.load(atlas, device)
     values = _values(loaded, set or [])
     if template:
         surface = loaded.template(resolution)
@@ -393,7 +395,7 @@ def reconstruction(
     json_file: Annotated[Path | None, Parameter(name="--json")] = None,
     limit: int = 0,
 ) -> None:
-    """Refit the held-out shapes with their covariates known, and check the effects where the truth is known.
+    """Refit the held-out shapes, covariates given and inferred, and check effects where the truth is known.
 
     Args:
         atlas: the .safetensors file.
@@ -402,26 +404,86 @@ def reconstruction(
         json_file: also write the figures to this file.
         limit: at most so many held-out shapes; 0 takes all.
     """
-    from naisr_model.atlas import Atlas
-    from naisr_model.data.store import SampleStore
     from naisr_model.evaluation.reconstruction import EvaluationConfig
     from naisr_model.evaluation.reconstruction import evaluate as run
     from naisr_model.evaluation.tables import PUBLISHED_AIRWAY, reconstruction_markdown
 
-    if limit < 0:
-        raise InputError(f"--limit is {limit}; give 0 or more")
-    loaded = Atlas.load(atlas)
-    config = EvaluationConfig(limit=limit)
+    _require_at_least("--limit", limit, 0)
+    loaded, samples = _with_store(atlas, store)
     with _bar("evaluating") as progress, _stoppable() as stop:
-        report = run(
-            loaded,
-            config,
-            None if store is None else SampleStore.open(store),
-            progress=progress,
-            should_stop=stop,
-        )
+        report = run(loaded, EvaluationConfig(limit=limit), samples, progress=progress, should_stop=stop)
     print(reconstruction_markdown(report, PUBLISHED_AIRWAY if loaded.name == "airway" else ()))
     _write_json(json_file, report)
+
+
+@evaluate.command(name="transfer")
+def transferring(
+    atlas: Path,
+    *,
+    store: Path | None = None,
+    json_file: Annotated[Path | None, Parameter(name="--json")] = None,
+    limit: int = 0,
+) -> None:
+    """Fit held-out subjects once and predict them at other visits and other covariates.
+
+    Args:
+        atlas: the .safetensors file.
+        store: where its held-out shapes are; not needed for the synthetic populations.
+        json_file: also write the figures to this file.
+        limit: at most so many subjects, those with most visits first; 0 takes all.
+    """
+    from naisr_model.evaluation.tables import PUBLISHED_AIRWAY_TRANSFER
+    from naisr_model.evaluation.transfer import transfer as run
+    from naisr_model.evaluation.transfer import transfer_markdown
+
+    _require_at_least("--limit", limit, 0)
+    loaded, samples = _with_store(atlas, store)
+    with _bar("fitting") as progress, _stoppable() as stop:
+        report = run(loaded, samples, limit or None, progress=progress, should_stop=stop)
+    print(transfer_markdown(report, PUBLISHED_AIRWAY_TRANSFER if loaded.name == "airway" else ()))
+    _write_json(json_file, report)
+
+
+@evaluate.command
+def completion(
+    atlas: Path,
+    *,
+    store: Path | None = None,
+    json_file: Annotated[Path | None, Parameter(name="--json")] = None,
+    limit: int = 0,
+) -> None:
+    """Cut a third of each held-out surface away and measure how well a fit of the rest completes it.
+
+    Args:
+        atlas: the .safetensors file.
+        store: where its held-out shapes are; not needed for the synthetic populations.
+        json_file: also write the figures to this file.
+        limit: at most so many held-out shapes; 0 takes all.
+    """
+    from naisr_model.evaluation.completion import completion as run
+    from naisr_model.evaluation.completion import completion_markdown
+    from naisr_model.evaluation.reconstruction import held_out_shapes
+
+    _require_at_least("--limit", limit, 0)
+    loaded, samples = _with_store(atlas, store)
+    shapes = held_out_shapes(loaded, samples, limit or None)
+    with _bar("fitting") as progress, _stoppable() as stop:
+        report = run(loaded, shapes, progress=progress, should_stop=stop)
+    print(completion_markdown(report))
+    _write_json(json_file, report)
+
+
+def _require_at_least(option: str, value: int, least: int) -> None:
+    if value < least:
+        raise InputError(f"{option} is {value}; give {least} or more")
+
+
+def _with_store(atlas: Path, store: Path | None) -> tuple[Any, Any]:
+    """An atlas, and the store of its held-out shapes where one was named."""
+    from naisr_model.atlas import Atlas
+    from naisr_model.data.store import SampleStore
+
+    return Atlas.load(atlas), None if store is None else SampleStore.open(store)
 
 
 @evaluate.command
@@ -440,16 +502,13 @@ def fitting(
         json_file: also write the figures to this file.
         limit: at most so many held-out shapes.
     """
-    from naisr_model.atlas import Atlas
     from naisr_model.config import FitConfig
-    from naisr_model.data.store import SampleStore
     from naisr_model.evaluation.fitting import compare_fits, comparison_markdown
     from naisr_model.evaluation.reconstruction import held_out_shapes
 
-    if limit < 1:
-        raise InputError(f"--limit is {limit}; give at least 1")
-    loaded = Atlas.load(atlas)
-    shapes = held_out_shapes(loaded, None if store is None else SampleStore.open(store), limit)
+    _require_at_least("--limit", limit, 1)
+    loaded, samples = _with_store(atlas, store)
+    shapes = held_out_shapes(loaded, samples, limit)
     with _bar("fitting") as progress, _stoppable() as stop:
         report = compare_fits(loaded, shapes, FitConfig(), progress=progress, should_stop=stop)
     print(comparison_markdown(report, FitConfig()))
@@ -491,6 +550,7 @@ def bench(
     *,
     json_file: Annotated[Path | None, Parameter(name="--json")] = None,
     quick: Annotated[bool, Parameter(negative=())] = False,
+    device: str = "cpu",
 ) -> None:
     """Measure how fast everything is on this machine, at the paper's network size; takes some minutes.
 
@@ -498,13 +558,14 @@ def bench(
         atlas: the .safetensors file; left out, the airway atlas that comes with the program.
         json_file: also write the figures to this file.
         quick: see in less than a minute that everything runs; the figures then say little.
+        device: where networks are evaluated and trained: cpu, cuda or mps.
     """
     from naisr_model.evaluation.bench import QUICK, Scope, default_atlas, markdown
     from naisr_model.evaluation.bench import bench as run
 
     scope = QUICK if quick else Scope()
     with _bar("measuring") as progress, _stoppable() as stop:
-        record = run(atlas or default_atlas(), scope, progress=progress, should_stop=stop)
+        record = run(atlas or default_atlas(), scope, device=device, progress=progress, should_stop=stop)
     print(markdown(record, scope))
     _write_json(json_file, record)
 

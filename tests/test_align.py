@@ -17,7 +17,7 @@ from naisr_model.data.align import (
     read_landmarks,
     rigid_transform,
 )
-from naisr_model.errors import InputError
+from naisr_model.errors import Cancelled, InputError
 
 NAMES = ("cords", "carina", "choana", "epiglottis", "tongue base")
 POINTS = np.array([[0, 0, 0], [0, -5, -90], [5, 40, 80], [0, 12, 25], [-8, 20, 40]], dtype=float)
@@ -171,6 +171,33 @@ def test_icp_finds_whole_and_partial_shapes(which, degrees):
     assert proposal.after_mm < 0.2 < 20 < proposal.before_mm
 
 
+@pytest.mark.parametrize("which", ["no bottom", "no top", "cloud"])
+def test_a_part_upside_down_is_righted_and_no_doubt_is_left(which):
+    body, over = branched(), np.diag([1.0, -1.0, -1.0, 1.0])
+    scan = part(body, "no top" if which == "cloud" else which)
+    if which == "cloud":
+        scan = trimesh.Trimesh(scan.vertices, np.zeros((0, 3), int), process=False)
+    proposal = propose("icp", scan.apply_transform(over), body)
+    back = apply(proposal.transform @ over, body.vertices)
+    assert np.linalg.norm(back - body.vertices, axis=1).max() < 2.0
+    assert proposal.turned_deg == pytest.approx(180, abs=3) and proposal.rival_deg is None
+
+
+def test_of_orientations_that_do_as_well_the_files_own_is_kept_and_the_doubt_is_told():
+    egg = trimesh.creation.icosphere(3).apply_scale([20.0, 24.0, 40.0])
+    scan = egg.copy().apply_scale([1.0, 0.98, 1.04])
+    scan.apply_transform(trimesh.transformations.rotation_matrix(np.radians(20), [1, 0, 0]))
+    proposal = propose("icp", scan, egg)
+    assert proposal.after_mm < 1.0 and proposal.turned_deg == pytest.approx(20, abs=2)
+    assert proposal.rival_deg == pytest.approx(180, abs=5)
+
+
+def test_an_alignment_can_be_stopped():
+    polls = iter([False] * 5 + [True])
+    with pytest.raises(Cancelled):
+        propose("icp", knobbly(), branched(), should_stop=lambda: next(polls))
+
+
 SHIFT_MM = np.array([-5.0, 8.0, -12.0])
 
 
@@ -198,6 +225,7 @@ def test_landmarks_are_proposed_with_their_residual():
     scan = trimesh.Trimesh(turn.apply(body.vertices) + 50.0, body.faces, process=False)
     exact = propose("landmarks", scan, body, alignment, named(turn.apply(POINTS) + 50.0))
     assert exact.landmarks_mm == pytest.approx(0.0, abs=1e-4)
+    assert exact.turned_deg == pytest.approx(np.degrees(turn.magnitude())) and exact.rival_deg is None
     assert exact.after_mm == pytest.approx(0.0, abs=1e-3)
     loose = propose("landmarks", scan, body, alignment, named(turn.apply(off) + 50.0))
     assert loose.landmarks_mm is not None and 0.1 < loose.landmarks_mm < 3 / np.sqrt(5) + 0.1

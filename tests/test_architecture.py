@@ -46,7 +46,12 @@ COVARIATES = "naisr_model.covariates"
 ERRORS = "naisr_model.errors"
 VIEWS = "naisr_viewer.views"
 CANVAS = "naisr_viewer.views.canvas"
-NO_QT = tuple(f"naisr_viewer.{name}" for name in ("state", "requests", "engine", "session", "export"))
+NUMERICAL = tuple(f"naisr_viewer.{name}" for name in ("engine", "members", "clinic"))
+"""Where the viewer meets the model."""
+
+QUIET = ("state", "requests", "patients", "captions", "cache", "export")
+NO_QT = (*NUMERICAL, *(f"naisr_viewer.{name}" for name in QUIET))
+DRIVERS = tuple(f"naisr_viewer.{name}" for name in ("app", "controller", "desk", "worker"))
 GROUND = ("naisr_model", *(f"naisr_model.{name}" for name in FLOORS[1]))
 
 RULES = (
@@ -56,14 +61,14 @@ RULES = (
         ("naisr_viewer*",),
         ("naisr_model",),
         allowed=(ERRORS,),
-        but_not=("naisr_viewer.engine", "naisr_viewer.state", VIEWS + "*"),
+        but_not=(*NUMERICAL, "naisr_viewer.state", VIEWS + "*"),
     ),
     Rule(("naisr_viewer.state", VIEWS + "*"), ("naisr_model",), allowed=(ERRORS, COVARIATES)),
-    Rule(("naisr_viewer*",), ("torch",), but_not=("naisr_viewer.engine",)),
+    Rule(("naisr_viewer*",), ("torch",)),
     Rule(("naisr_viewer*",), ("pyvistaqt",), but_not=(CANVAS,)),
     Rule(NO_QT, (*QT, VIEWS)),
     Rule(("naisr_viewer.worker",), ("naisr_viewer.engine", VIEWS)),
-    Rule((VIEWS + "*",), tuple(f"naisr_viewer.{name}" for name in ("app", "controller", "engine", "worker"))),
+    Rule((VIEWS + "*",), (*DRIVERS, *NUMERICAL)),
     Rule(("naisr_viewer*",), ("naisr_viewer.app",), but_not=("naisr_viewer.__main__",)),
 )
 
@@ -189,7 +194,8 @@ SOUND = {
     "naisr_model/cli.py": "def main():\n    from naisr_model.atlas import Atlas",
     "naisr_viewer/__init__.py": "",
     "naisr_viewer/state.py": "from naisr_model.covariates import Covariate",
-    "naisr_viewer/engine.py": "import torch\nfrom naisr_model.atlas import Atlas",
+    "naisr_viewer/engine.py": "from naisr_model.atlas import Atlas",
+    "naisr_viewer/clinic.py": "from naisr_viewer.engine import Engine\nimport naisr_model.evaluation.intake",
     "naisr_viewer/worker.py": "from PySide6.QtCore import QObject\nfrom naisr_model.errors import Cancelled",
     "naisr_viewer/controller.py": "from naisr_viewer import engine, state, worker",
     "naisr_viewer/views/__init__.py": "",
@@ -219,6 +225,9 @@ BROKEN = {
     "a state that knows the atlas": ("naisr_viewer/state.py", "from naisr_model.atlas import Atlas"),
     "a view that knows the atlas": ("naisr_viewer/views/panel.py", "from naisr_model.atlas import Atlas"),
     "a view that knows the controller": ("naisr_viewer/views/panel.py", "from .. import controller"),
+    "a view that knows the clinic": ("naisr_viewer/views/panel.py", "from naisr_viewer.clinic import Clinic"),
+    "Qt in the clinic": ("naisr_viewer/clinic.py", "from PySide6.QtCore import QObject"),
+    "a desk that knows the model": ("naisr_viewer/desk.py", "import naisr_model.evaluation.intake"),
     "a second door to pyvistaqt": ("naisr_viewer/controller.py", "from pyvistaqt import QtInteractor"),
     "Qt in the state": ("naisr_viewer/state.py", "from PySide6.QtGui import QColor"),
     "Qt in the engine by way of qtpy": ("naisr_viewer/engine.py", "from qtpy import QtCore"),

@@ -16,7 +16,8 @@ from naisr_model import cli
 from naisr_model.atlas import Atlas
 from naisr_model.checkpoint import load
 from naisr_model.data.align import Alignment
-from naisr_model.evaluation.intake import take_in
+from naisr_model.errors import InputError
+from naisr_model.evaluation.intake import aligned, labels, read, take_in
 
 KNOWN = ["--known", "age=6,sex=M"]
 TRUE_CM3 = egg(6.0, 1.0).volume / 1000
@@ -127,6 +128,45 @@ def test_one_of_several_labels_must_be_chosen(egg_atlas, tmp_path, capsys):
         assert message in capsys.readouterr().err
 
 
+def test_labels_can_be_listed_before_one_is_read(egg_atlas, tmp_path):
+    path = label_volume(tmp_path / "scan.nrrd")
+    titles = labels(path)
+    assert titles is not None and titles[1] == "1: 0.064 cm3" and titles[2].startswith("2 'egg': 58.")
+    assert labels(saved(egg(6.0, 1.0), tmp_path / "egg.stl")) is None
+    intake = read(path, Atlas.load(egg_atlas), label=2)
+    assert intake.is_ready and intake.proposal is None
+    assert intake.patient.volume_cm3 == pytest.approx(TRUE_CM3, rel=0.01)
+    assert intake.to_json()["volume_cm3"] == intake.patient.volume_cm3
+    (tmp_path / "bad.nrrd").write_bytes(b"NRRD0004\n")
+    with pytest.raises(InputError, match=r"bad\.nrrd"):
+        labels(tmp_path / "bad.nrrd")
+
+
+def test_a_person_may_look_before_aligning(egg_atlas, tmp_path):
+    atlas, path = Atlas.load(egg_atlas), saved(egg(6.0, 1.0), tmp_path / "far.stl", turned(0, [0, 0, 400]))
+    far = read(path, atlas)
+    assert not far.is_ready and [finding.topic for finding in far.findings] == ["far"]
+    assert "align it to the atlas" in far.remarks[0]
+    assert aligned(far, atlas, {"age": 6.0}, "none") is far
+    home = aligned(far, atlas, {"age": 6.0}, "icp")
+    assert home.is_ready and home.findings == () and home.method == "icp"
+    assert home.proposal is not None and home.proposal.turned_deg < 20
+    assert any("fits nearly as well" in remark for remark in home.remarks), "an egg turned over is an egg"
+    assert home.proposal is not None and home.proposal.after_mm < 1.5 < 300 < home.proposal.before_mm
+    assert np.array_equal(far.patient.from_file, np.eye(4)), "the proposal can still be declined"
+    whole = take_in(path, atlas, {"age": 6.0}, align="icp")
+    assert np.array_equal(whole.patient.from_file, home.patient.from_file)
+    assert whole.sentences == home.sentences
+
+
+def test_an_open_surface_has_no_volume_of_its_own(egg_atlas, tmp_path):
+    part = egg(6.0, 1.0)
+    part.update_faces(part.triangles_center[:, 2] < 15)
+    intake = read(saved(part, tmp_path / "part.ply"), Atlas.load(egg_atlas))
+    assert intake.is_ready and not intake.patient.is_closed and intake.patient.volume_cm3 is None
+    assert "volume" not in intake.sentences[-1].split(";")[0]
+
+
 def test_points_and_a_part_will_do(told, plain, tmp_path):
     points = tmp_path / "points.csv"
     np.savetxt(points, egg(6.0, 1.0).sample(400, seed=0), delimiter=",", header="x,y,z", comments="")
@@ -170,8 +210,8 @@ def test_landmarks_follow_the_repairs(egg_atlas, tmp_path):
     [
         (turned(0, [0, 0, 500]), [], "far.stl: the shape lies 5"),
         (np.diag([3.0, 3.0, 3.0, 1.0]), ["--scale", "1"], "the atlas's shapes are up to"),
-        (np.eye(4), ["--scale", "-1"], "--scale is -1"),
-        (np.eye(4), ["--align", "landmarks"], "--align landmarks and --landmarks FILE.csv need each other"),
+        (np.eye(4), ["--scale", "-1"], "the scale is -1"),
+        (np.eye(4), ["--align", "landmarks"], "--landmarks FILE.csv) need each other; give both"),
         (np.eye(4), ["--label", "2"], "is no label volume"),
         (np.eye(4), ["--align", "magic"], "magic"),
         (np.diag([1.0, 1.0, 1e-9, 1.0]), [], "flat"),

@@ -47,6 +47,16 @@ def test_mean_and_median_of_every_distance() -> None:
     assert found["vd_cm3"] == pytest.approx({"mean": 0.1, "median": 0.1})
 
 
+def test_fits_with_nothing_known_stand_beside_the_others() -> None:
+    found = report(inferred=OTHERS)
+    assert found["inferred"]["n"] == 2
+    assert found["inferred"]["cd_x100"] == pytest.approx({"mean": 0.04, "median": 0.04})
+    text = reconstruction_markdown(found)
+    assert "3 held-out shapes, covariates given | 0.03 / 0.02" in text
+    assert "2 held-out shapes, covariates inferred | 0.04 / 0.04" in text
+    assert "inferred" not in reconstruction_markdown(report())
+
+
 def test_the_worst_volume_error_is_kept_with_its_sign() -> None:
     found = report()
     assert found["truth_volume_error"] == pytest.approx({"6": -0.1, "220": 2 / 60})

@@ -7,6 +7,7 @@ and rotates about it; ``icp`` moves the surface onto reference points.
 from __future__ import annotations
 
 import csv
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -19,8 +20,10 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from naisr_model.errors import InputError
+from naisr_model.data.patients import rim
+from naisr_model.errors import Cancelled, InputError
 
+StopCheck = Callable[[], bool]
 Method = Literal["none", "icp", "landmarks"]
 METHODS: tuple[str, ...] = get_args(Method)
 Landmarks = Mapping[str, tuple[float, float, float]]
@@ -28,13 +31,24 @@ Landmarks = Mapping[str, tuple[float, float, float]]
 REFERENCE_POINTS = 1000
 ICP_ITERATIONS = 200
 ICP_TOLERANCE_MM = 2e-3
-START_POINTS = 200
-START_ITERATIONS = 30
+SCOUT_POINTS, SCOUT_ITERATIONS, SCOUT_CLOUD = 100, 6, 4000
+"""What every start gets; so many points stand for the surface then."""
+
+PROMISING, START_POINTS, START_ITERATIONS = 10, 200, 30
+"""How many of the starts go on, no two alike, and with what."""
+
+ALIKE_DEG, ALIKE_SHARE = 10.0, 0.05
+"""Up to which two starts are alike: by turn, and by shift as a share of the reference's length."""
+
 START_SHIFTS = (0.0, 0.2, -0.2, 0.4, -0.4)
 """Where along the reference starts are tried, from centre on centre, as shares of its length."""
 
-POOR_FIT = 0.01
-"""From this mean distance on, as a share of the reference's longest side, turned starts are tried."""
+ALIKE, DOUBTFUL = 1.25, 1.6
+"""Costs of two orientations, as a ratio, up to which they explain a scan equally well and nearly as well.
+Of airways and bodies, whole and cut, other orientations cost from 1.7 times as much on."""
+
+UPRIGHT_DEG, RIVAL_DEG = 15.0, 45.0
+"""Up to the first, two orientations count as one; from the second on, as different."""
 
 OVERLAP_POWER = 3.0
 LEAST_OVERLAP = 0.3
@@ -176,12 +190,17 @@ class Proposal:
         transform: 4x4, scanner millimetres to the atlas frame.
         before_mm: mean distance of the scan's surface to the reference shape as the scan lies.
         after_mm: the same after the motion.
+        turned_deg: by how much the motion turns the scan about some axis.
+        rival_deg: how far from the proposed orientation another one lies that explains the shape nearly
+            as well; None where there is no such doubt, or where it was not asked.
         landmarks_mm: root mean square distance of the landmarks after the motion; None without them.
     """
 
     transform: NDArray[np.float64]
     before_mm: float
     after_mm: float
+    turned_deg: float
+    rival_deg: float | None = None
     landmarks_mm: float | None = None
 
 
@@ -191,6 +210,7 @@ def propose(
     reference_mm: trimesh.Trimesh,
     alignment: Alignment | None = None,
     landmarks: Landmarks | None = None,
+    should_stop: StopCheck | None = None,
 ) -> Proposal:
     """Find the motion of one scan to the atlas frame without making it.
 
@@ -200,12 +220,14 @@ def propose(
         reference_mm: the atlas's own shape, best at what is known of the patient, since size is kept.
         alignment: that of the atlas; for ``landmarks``.
         landmarks: those of the scan, in its coordinates; for ``landmarks``.
+        should_stop: polled while ``icp`` seeks.
 
     Raises:
         InputError: when landmarks are asked for and the atlas or the scan has none or too few.
+        Cancelled: when ``should_stop()`` turned true.
     """
-    transform, landmarks_mm = np.eye(4), None
-    scan = _surface_side(mesh_mm, REFERENCE_POINTS)
+    transform, rival_deg, landmarks_mm = np.eye(4), None, None
+    scan = _scan_side(mesh_mm, REFERENCE_POINTS)
     reference = _surface_side(reference_mm, REFERENCE_POINTS)
     if method == "landmarks":
         if alignment is None or alignment.method != "landmarks":
@@ -213,9 +235,9 @@ def propose(
         transform = _landmark_transform(alignment, landmarks or {})
         landmarks_mm = _landmark_residual_mm(alignment, landmarks or {}, transform)
     elif method == "icp":
-        transform = _register(scan, reference, bool(mesh_mm.is_watertight))
+        transform, rival_deg = _register(scan, reference, should_stop)
     before_mm, after_mm = (_mean_distance_mm(scan, reference, matrix) for matrix in (np.eye(4), transform))
-    return Proposal(transform, before_mm, after_mm, landmarks_mm)
+    return Proposal(transform, before_mm, after_mm, _angle_deg(transform), rival_deg, landmarks_mm)
 
 
 def _landmark_residual_mm(
@@ -229,65 +251,96 @@ def _landmark_residual_mm(
 
 def _mean_distance_mm(scan: _Side, reference: _Side, transform: NDArray[np.float64]) -> float:
     points = _applied(transform, scan.samples)
-    return float(np.linalg.norm(reference.nearest(points) - points, axis=1).mean())
+    return float(np.linalg.norm(reference.nearest(points)[0] - points, axis=1).mean())
 
 
 def _applied(transform: NDArray[Any], points: NDArray[Any]) -> NDArray[np.float64]:
     return points @ transform[:3, :3].T + transform[:3, 3]
 
 
-def _register(scan: _Side, reference: _Side, whole: bool) -> NDArray[np.float64]:
-    """Trimmed closest points from several starts; turned ones only where the scan's own axes fail.
+def _angle_deg(transform: NDArray[np.float64]) -> float:
+    return float(np.degrees(Rotation.from_matrix(transform[:3, :3]).magnitude()))
 
-    Of a part, the reference's pairs are left out: they would draw it to the middle of the whole.
+
+def _register(
+    scan: _Side, reference: _Side, should_stop: StopCheck | None
+) -> tuple[NDArray[np.float64], float | None]:
+    """Trimmed closest points from several starts, and how far another orientation lies that does as well.
+
+    Of the orientations that explain the scan about equally well, the one nearest to the file's own is
+    taken: whoever made the file rarely turned it upside down.
     """
-    kept = (_overlapping, _overlapping if whole else _nothing)
-    few = _thinned(scan), _thinned(reference)
-    best = _best(few, [np.eye(4), *_shifted(few, np.eye(3))], kept)
-    if _misfit_mm(*few, best, kept) > POOR_FIT * np.ptp(reference.samples, axis=0).max():
-        turned = [start for rotation in _turns(few) for start in _shifted(few, rotation)]
-        best = _best(few, [best, *turned], kept)
-    return _closest_points(scan, reference, best, kept, ICP_ITERATIONS)
+    few = _thinned(scan, START_POINTS), _thinned(reference, START_POINTS)
+    found = [
+        _closest_points(*few, one, _overlapping, START_ITERATIONS, should_stop)
+        for one in _promising(scan, reference, should_stop)
+    ]
+    costs = np.array([_misfit_mm(*few, transform) for transform in found])
+    best = _nearest_upright(found, costs)
+    away = np.array([_angle_deg(other @ np.linalg.inv(found[best])) for other in found])
+    rivals = np.flatnonzero((away > RIVAL_DEG) & (costs <= DOUBTFUL * costs[best]))
+    transform = _closest_points(scan, reference, found[best], _overlapping, ICP_ITERATIONS, should_stop)
+    return transform, float(away[rivals[costs[rivals].argmin()]]) if len(rivals) else None
 
 
-def _thinned(side: _Side) -> _Side:
+def _promising(scan: _Side, reference: _Side, should_stop: StopCheck | None) -> list[NDArray[np.float64]]:
+    """The best of many starts after some quick steps, no two alike."""
+    clouds = _thinned(_as_cloud(scan), SCOUT_POINTS), _thinned(_as_cloud(reference), SCOUT_POINTS)
+    rotations = [np.eye(3), *_turns(scan, reference)]
+    starts = [np.eye(4)] + [start for rotation in rotations for start in _shifted(scan, reference, rotation)]
+    tried = [_closest_points(*clouds, one, _overlapping, SCOUT_ITERATIONS, should_stop) for one in starts]
+    few = _thinned(scan, SCOUT_POINTS), _thinned(reference, SCOUT_POINTS)
+    centre, length_mm = scan.samples.mean(axis=0), float(np.ptp(reference.samples, axis=0).max())
+    chosen: list[NDArray[np.float64]] = []
+    for one in sorted(tried, key=lambda transform: _misfit_mm(*few, transform)):
+        if len(chosen) < PROMISING and not any(_are_alike(one, other, centre, length_mm) for other in chosen):
+            chosen.append(one)
+    return chosen
+
+
+def _are_alike(
+    one: NDArray[np.float64], other: NDArray[np.float64], centre: NDArray[np.float64], length_mm: float
+) -> bool:
+    apart_mm = float(np.linalg.norm(_applied(one, centre) - _applied(other, centre)))
+    return apart_mm < ALIKE_SHARE * length_mm and _angle_deg(one @ np.linalg.inv(other)) < ALIKE_DEG
+
+
+def _nearest_upright(found: Sequence[NDArray[np.float64]], costs: NDArray[np.float64]) -> int:
+    """Of the motions with about the least cost, the best of those that turn least."""
+    close = np.flatnonzero(costs <= ALIKE * costs.min())
+    angles = np.array([_angle_deg(transform) for transform in found])[close]
+    upright = close[angles <= angles.min() + UPRIGHT_DEG]
+    return int(upright[costs[upright].argmin()])
+
+
+def _thinned(side: _Side, count: int) -> _Side:
     """Samples come in random order, so the first ones cover the shape as well."""
-    return replace(side, samples=side.samples[:START_POINTS])
+    return replace(side, samples=side.samples[:count])
 
 
-def _best(
-    sides: tuple[_Side, _Side], starts: Sequence[NDArray[np.float64]], kept: tuple[Kept, Kept]
-) -> NDArray[np.float64]:
-    found = [_closest_points(*sides, start, kept, START_ITERATIONS) for start in starts]
-    return min(found, key=lambda transform: _misfit_mm(*sides, transform, kept))
+def _misfit_mm(scan: _Side, reference: _Side, transform: NDArray[np.float64]) -> float:
+    """The smallest of :func:`_overlap_costs` of all pairs, from both sides."""
+    distances_mm = [pairs.distances_mm for pairs in _pairs(scan, reference, transform)]
+    return float(_overlap_costs(np.concatenate(distances_mm)).min())
 
 
-def _misfit_mm(
-    scan: _Side, reference: _Side, transform: NDArray[np.float64], kept: tuple[Kept, Kept]
-) -> float:
-    """Mean of the smallest costs of :func:`_overlap_costs` over the directions in use."""
-    points = _applied(transform, scan.samples)
-    back = _applied(np.linalg.inv(transform), reference.samples)
-    here = np.linalg.norm(reference.nearest(points) - points, axis=1)
-    there = np.linalg.norm(scan.nearest(back) - back, axis=1)
-    used = [distances for distances, keep in zip((here, there), kept, strict=True) if keep(distances).any()]
-    return float(np.mean([_overlap_costs(distances).min() for distances in used]))
-
-
-def _shifted(sides: tuple[_Side, _Side], rotation: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+def _shifted(scan: _Side, reference: _Side, rotation: NDArray[np.float64]) -> list[NDArray[np.float64]]:
     """Starts with centre on centre and moved along the reference's longest axis, where a part may lie."""
-    points, target = (side.samples for side in sides)
-    middle = target.mean(axis=0) - rotation @ points.mean(axis=0)
-    axis = _axes(target)[:, 0]
-    length = float(np.ptp(target @ axis))
+    middle = reference.samples.mean(axis=0) - rotation @ scan.samples.mean(axis=0)
+    axis = _axes(reference.samples)[:, 0]
+    length = float(np.ptp(reference.samples @ axis))
     return [_matrix(rotation, middle + share * length * axis) for share in START_SHIFTS]
 
 
-def _turns(sides: tuple[_Side, _Side]) -> list[NDArray[np.float64]]:
-    """The four rotations that lay principal axes on principal axes."""
-    axes, goal = (_axes(side.samples) for side in sides)
-    signs = [(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)]
-    return [goal @ np.diag(np.array(sign, float)) @ axes.T for sign in signs]
+def _turns(scan: _Side, reference: _Side) -> list[NDArray[np.float64]]:
+    """The 24 rotations that lay principal axes on principal axes; of a part the longest may be another."""
+    axes, goal = _axes(scan.samples), _axes(reference.samples)
+    signed = [
+        np.eye(3)[list(order)] * np.array(signs, float)
+        for order in itertools.permutations(range(3))
+        for signs in itertools.product((1, -1), repeat=3)
+    ]
+    return [goal @ turn @ axes.T for turn in signed if np.linalg.det(turn) > 0]
 
 
 def _axes(points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -302,6 +355,8 @@ def _overlapping(distances_mm: NDArray[np.float64]) -> NDArray[np.bool_]:
     Phillips, Liu and Tomasi, "Outlier robust ICP for minimizing fractional RMSD", 2007: root mean square
     of the share f, divided by f to a power; no share has to be given.
     """
+    if not len(distances_mm):
+        return np.zeros(0, dtype=bool)
     order = np.argsort(distances_mm, kind="stable")
     costs = _overlap_costs(distances_mm)
     kept = np.zeros(len(order), dtype=bool)
@@ -320,41 +375,117 @@ def _overlap_costs(distances_mm: NDArray[np.float64]) -> NDArray[np.float64]:
 def _closest_point_transform(alignment: Alignment, mesh_mm: trimesh.Trimesh) -> NDArray[np.float64]:
     """Move a whole scan onto the reference points, started with the centres matched."""
     points = np.array(list(alignment.reference.values()))
-    tree = cKDTree(points)
-    reference = _Side(points, lambda query: points[tree.query(query)[1]])
+    reference = _point_side(points, points, np.ones(len(points), dtype=bool))
     scan = _surface_side(mesh_mm, len(points))
     start = _matrix(np.eye(3), points.mean(axis=0) - scan.samples.mean(axis=0))
-    return _closest_points(scan, reference, start, (_everything, _everything), ICP_ITERATIONS)
+    return _closest_points(scan, reference, start, _everything, ICP_ITERATIONS, None)
+
+
+Nearest = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.bool_]]]
 
 
 @dataclass(frozen=True, eq=False)
 class _Side:
-    """One of the two shapes: points on it, ``[n, 3]``, and the nearest points of it to others."""
+    """One of the two shapes.
+
+    Attributes:
+        samples: points on it, ``[n, 3]``.
+        nearest: to points ``[m, 3]`` the nearest ones on the shape, and whether such a pair is sound: it is
+            not where the shape ends there and the other one may go on.
+        cloud: points that stand for the shape where speed counts, ``[k, 3]``.
+        sound: whether a pair with each of them is, ``[k]``.
+    """
 
     samples: NDArray[np.float64]
-    nearest: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    nearest: Nearest
+    cloud: NDArray[np.float64]
+    sound: NDArray[np.bool_]
 
 
-def _surface_side(mesh_mm: trimesh.Trimesh, count: int) -> _Side:
-    """Of a mesh its surface, of a cloud its points."""
-    vertices = np.ascontiguousarray(mesh_mm.vertices, dtype=np.float64)
+def _scan_side(mesh_mm: trimesh.Trimesh, count: int) -> _Side:
+    """A patient's: what lies beyond the rim of an open surface was not seen, nor what a cloud leaves out.
+
+    Pairs on the rim are left out as by Turk and Levoy, "Zippered polygon meshes from range images", 1994.
+    """
     if not len(mesh_mm.faces):
-        tree = cKDTree(vertices)
-        chosen = np.random.default_rng(0).permutation(len(vertices))[:count]
-        return _Side(vertices[chosen], lambda query: vertices[tree.query(query)[1]])
+        vertices = np.asarray(mesh_mm.vertices, dtype=np.float64)
+        order = np.random.default_rng(0).permutation(len(vertices))
+        return _point_side(vertices[order[:count]], vertices, np.zeros(len(vertices), dtype=bool))
+    return _surface_side(mesh_mm, count, np.unique(rim(mesh_mm)))
+
+
+def _point_side(samples: NDArray[np.float64], points: NDArray[np.float64], sound: NDArray[np.bool_]) -> _Side:
+    tree = cKDTree(points)
+
+    def nearest(query: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        found = tree.query(query)[1]
+        return points[found], sound[found]
+
+    return _Side(samples, nearest, points, sound)
+
+
+def _as_cloud(side: _Side) -> _Side:
+    return _point_side(side.samples, side.cloud, side.sound)
+
+
+def _surface_side(
+    mesh_mm: trimesh.Trimesh, count: int, rim_vertices: NDArray[np.int64] | None = None
+) -> _Side:
+    """A surface; of an open one with the vertices on its rim."""
+    vertices = np.ascontiguousarray(mesh_mm.vertices, dtype=np.float64)
     faces = np.ascontiguousarray(mesh_mm.faces, dtype=np.int64)
+    at_rim = np.zeros(len(vertices), dtype=bool)
+    at_rim[[] if rim_vertices is None else rim_vertices] = True
+    inside: NDArray[np.bool_] = np.logical_not(at_rim[faces].any(axis=1))
     surface = igl.AABB()
     surface.init(vertices, faces)
+
+    def nearest(query: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        _, face, points = surface.squared_distance(vertices, faces, query)
+        return points, inside[face]
+
     samples = np.asarray(trimesh.sample.sample_surface(mesh_mm, count, seed=0)[0])
-    return _Side(samples, lambda query: surface.squared_distance(vertices, faces, query)[2])
+    dense = np.asarray(trimesh.sample.sample_surface(mesh_mm, SCOUT_CLOUD, seed=1)[0])
+    cloud, edge = np.concatenate([dense, vertices[at_rim]]), int(at_rim.sum())
+    return _Side(samples, nearest, cloud, np.arange(len(cloud)) < len(cloud) - edge)
+
+
+@dataclass(frozen=True, eq=False)
+class _Pairs:
+    """Points that are taken for each other.
+
+    Attributes:
+        scan: in the scan's own coordinates, ``[n, 3]``.
+        reference: ``[n, 3]``.
+        distances_mm: between them after the motion, ``[n]``.
+    """
+
+    scan: NDArray[np.float64]
+    reference: NDArray[np.float64]
+    distances_mm: NDArray[np.float64]
+
+
+def _pairs(scan: _Side, reference: _Side, transform: NDArray[np.float64]) -> tuple[_Pairs, _Pairs]:
+    """The sound pairs of the reference's samples with the scan, and of the scan's with the reference."""
+    rotation, shift_mm = transform[:3, :3], transform[:3, 3]
+    to_scan, seen = scan.nearest((reference.samples - shift_mm) @ rotation)
+    to_reference, inside = reference.nearest(_applied(transform, scan.samples))
+    return (
+        _paired(to_scan[seen], reference.samples[seen], transform),
+        _paired(scan.samples[inside], to_reference[inside], transform),
+    )
+
+
+def _paired(
+    scan: NDArray[np.float64],
+    reference: NDArray[np.float64],
+    transform: NDArray[np.float64],
+) -> _Pairs:
+    return _Pairs(scan, reference, np.linalg.norm(_applied(transform, scan) - reference, axis=1))
 
 
 Kept = Callable[[NDArray[np.float64]], NDArray[np.bool_]]
 """Which pairs of nearest points count, by their distances."""
-
-
-def _nothing(distances_mm: NDArray[np.float64]) -> NDArray[np.bool_]:
-    return np.zeros(len(distances_mm), dtype=bool)
 
 
 def _everything(distances_mm: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -365,8 +496,9 @@ def _closest_points(
     scan: _Side,
     reference: _Side,
     start: NDArray[np.float64],
-    kept: tuple[Kept, Kept],
+    kept: Kept,
     iterations: int,
+    should_stop: StopCheck | None,
 ) -> NDArray[np.float64]:
     """Iterative closest points in both directions at once (Besl and McKay, 1992).
 
@@ -377,25 +509,35 @@ def _closest_points(
         scan: the shape to be moved.
         reference: the shape that it is moved onto.
         start: 4x4, scan to reference.
-        kept: which pairs count, of those from the scan and of those from the reference.
+        kept: which of the sound pairs of each direction count.
         iterations: at most so many.
+        should_stop: polled before every iteration.
+
+    Raises:
+        Cancelled: when ``should_stop()`` turned true.
     """
     rotation, shift_mm = start[:3, :3], start[:3, 3]
     for _ in range(iterations):
+        if should_stop is not None and should_stop():
+            raise Cancelled
         last = scan.samples @ rotation.T + shift_mm
-        to_reference = reference.nearest(last)
-        to_scan = scan.nearest((reference.samples - shift_mm) @ rotation)
-        back = to_scan @ rotation.T + shift_mm
-        here = kept[0](np.linalg.norm(to_reference - last, axis=1))
-        there = kept[1](np.linalg.norm(reference.samples - back, axis=1))
-        points = np.concatenate([to_scan[there], scan.samples[here]])
-        goals = np.concatenate([reference.samples[there], to_reference[here]])
+        pairs = _pairs(scan, reference, _matrix(rotation, shift_mm))
+        used = [kept(one.distances_mm) for one in pairs]
+        points = np.concatenate([one.scan[use] for one, use in zip(pairs, used, strict=True)])
+        goals = np.concatenate([one.reference[use] for one, use in zip(pairs, used, strict=True)])
         centre, goal = points.mean(axis=0), goals.mean(axis=0)
-        rotation = Rotation.align_vectors(goals - goal, points - centre)[0].as_matrix()
+        rotation = _best_rotation(points - centre, goals - goal)
         shift_mm = goal - rotation @ centre
         if np.abs(scan.samples @ rotation.T + shift_mm - last).max() < ICP_TOLERANCE_MM:
             break
     return _matrix(rotation, shift_mm)
+
+
+def _best_rotation(points: NDArray[np.float64], goals: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The rotation that lays ``points`` on ``goals``, both ``[n, 3]`` about 0 (Kabsch, 1976)."""
+    left, _, right = np.linalg.svd(goals.T @ points)
+    left[:, 2] *= np.linalg.det(left @ right)
+    return np.asarray(left @ right)
 
 
 def _matrix(rotation: NDArray[np.float64], shift_mm: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -70,7 +70,12 @@ class Patient:
     @property
     def is_closed(self) -> bool:
         """Whether the surface bounds a body, so that its volume means something."""
-        return not self.is_cloud and not len(_rim(self.mesh_mm))
+        return not self.is_cloud and not len(rim(self.mesh_mm))
+
+    @property
+    def volume_cm3(self) -> float | None:
+        """What the surface encloses; None where it is open or a cloud of points."""
+        return float(self.mesh_mm.volume) / 1000 if self.is_closed else None
 
 
 @dataclass(frozen=True)
@@ -144,7 +149,7 @@ def _from_labels(path: Path, volume: volumes.LabelVolume, label: int | str | Non
     sizes_cm3 = volumes.volumes_cm3(volume)
     if not sizes_cm3:
         raise InputError(f"{path.name} has no label; every voxel is 0, segment the scan first")
-    listed = ", ".join(f"{_titled(volume, key)}: {size:.3g} cm3" for key, size in sizes_cm3.items())
+    listed = ", ".join(volumes.titles(volume).values())
     if label is None and len(sizes_cm3) > 1:
         raise InputError(f"{path.name} has {len(sizes_cm3)} labels ({listed}); choose one of them")
     chosen = next(iter(sizes_cm3)) if label is None else _numbered(volume, label)
@@ -152,7 +157,7 @@ def _from_labels(path: Path, volume: volumes.LabelVolume, label: int | str | Non
         raise InputError(f"{path.name} has no label {label}; it has {listed}")
     surface = volumes.label_surface(volume, chosen)
     remarks = (*volume.remarks, *_label_remarks(volume, chosen, surface, sizes_cm3[chosen]))
-    return Patient(surface, f"{path.name}, label {_titled(volume, chosen)}", "LPS", remarks)
+    return Patient(surface, f"{path.name}, label {volumes.titled(volume, chosen)}", "LPS", remarks)
 
 
 def _numbered(volume: volumes.LabelVolume, label: int | str) -> int | None:
@@ -160,11 +165,6 @@ def _numbered(volume: volumes.LabelVolume, label: int | str) -> int | None:
     numbers = {name.casefold(): number for number, name in volume.names.items()}
     text = str(label).strip()
     return numbers.get(text.casefold(), int(text) if text.isdecimal() else None)
-
-
-def _titled(volume: volumes.LabelVolume, label: int) -> str:
-    name = volume.names.get(label, "")
-    return f"{label} '{name}'" if name else str(label)
 
 
 def _label_remarks(
@@ -399,19 +399,19 @@ def hole_areas_mm2(mesh_mm: trimesh.Trimesh) -> NDArray[np.float64]:
 
     The area vector of a rim is the sum of p x q / 2 over its directed edges.
     """
-    rim, points = _rim(mesh_mm), np.asarray(mesh_mm.vertices)
-    if not len(rim):
+    edges, points = rim(mesh_mm), np.asarray(mesh_mm.vertices)
+    if not len(edges):
         return np.zeros(0)
-    graph = coo_array((np.ones(len(rim)), rim.T), (len(points), len(points)))
-    hole = connected_components(graph)[1][rim[:, 0]]
-    points = points - points[rim].mean(axis=(0, 1))
-    vectors = np.cross(points[rim[:, 0]], points[rim[:, 1]]) / 2
+    graph = coo_array((np.ones(len(edges)), edges.T), (len(points), len(points)))
+    hole = connected_components(graph)[1][edges[:, 0]]
+    points = points - points[edges].mean(axis=(0, 1))
+    vectors = np.cross(points[edges[:, 0]], points[edges[:, 1]]) / 2
     areas = np.linalg.norm([np.bincount(hole, weights=column) for column in vectors.T], axis=0)
     return areas[np.unique(hole)]
 
 
-def _rim(mesh: trimesh.Trimesh) -> NDArray[np.int64]:
-    """Directed edges that no neighbour runs along in the other direction, ``[n, 2]``."""
+def rim(mesh: trimesh.Trimesh) -> NDArray[np.int64]:
+    """The edge of an open surface: directed edges that no neighbour runs along the other way, ``[n, 2]``."""
     edges = np.asarray(mesh.faces, np.int64)[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     keys = edges.min(axis=1) * len(mesh.vertices) + edges.max(axis=1)
     _, index = np.unique(keys, return_inverse=True)

@@ -230,6 +230,18 @@ def volumes_cm3(volume: LabelVolume) -> dict[int, float]:
     return {label: count * voxel_cm3 for label, count in sorted(counts.items()) if label}
 
 
+def titled(volume: LabelVolume, label: int) -> str:
+    """The label's number, with its name where the file gives one, as ``2 'airway'``."""
+    name = volume.names.get(label, "")
+    return f"{label} '{name}'" if name else str(label)
+
+
+def titles(volume: LabelVolume) -> dict[int, str]:
+    """The labels to choose from, each with its name and size: ``{2: "2 'airway': 41.9 cm3"}``."""
+    sizes_cm3 = volumes_cm3(volume)
+    return {label: f"{titled(volume, label)}: {size:.3g} cm3" for label, size in sizes_cm3.items()}
+
+
 def label_surface(volume: LabelVolume, label: int) -> trimesh.Trimesh:
     """The boundary of one label as a closed, smoothed surface with outward faces.
 

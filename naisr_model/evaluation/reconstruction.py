@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,15 +13,15 @@ import trimesh
 from numpy.typing import NDArray
 
 from naisr_model.atlas import Atlas
-from naisr_model.covariates import Covariate, Population, normalised_vector
+from naisr_model.covariates import Covariate, Population, Values, normalised_vector
 from naisr_model.data.align import rigid_transform
-from naisr_model.data.populations import POPULATIONS, PopulationModule
+from naisr_model.data.populations import POPULATIONS, PopulationModule, PopulationVisit
 from naisr_model.data.populations import population as population_module
 from naisr_model.data.store import SampleStore
 from naisr_model.errors import InputError
-from naisr_model.evaluation.metrics import compare, component_count, hausdorff_x100
+from naisr_model.evaluation.metrics import Distances, compare, component_count, hausdorff_x100
 from naisr_model.evaluation.tables import TruthPoint, reconstruction_report
-from naisr_model.learning.fit import fit_shape
+from naisr_model.learning.fit import ShapeFit, fit_shape
 from naisr_model.learning.prior import prior_of
 from naisr_model.learning.target import target_of
 from naisr_model.surface.folding import folded_shares
@@ -51,10 +51,19 @@ class EvaluationConfig:
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """One shape that the training never saw, in the atlas frame."""
+    """One shape that the training never saw, in the atlas frame.
+
+    Attributes:
+        values: covariates in real units.
+        mesh_mm: the surface.
+        subject: whose it is.
+        visit: which of the subject's.
+    """
 
     values: dict[str, float]
     mesh_mm: trimesh.Trimesh
+    subject: str = ""
+    visit: str = ""
 
 
 def evaluate(
@@ -78,23 +87,24 @@ def evaluate(
     shapes = held_out_shapes(atlas, store, config.limit or None)
     if not shapes:
         raise InputError("no shape was held out, so nothing can be evaluated; prepare with --held-out 0.2")
-    latents = fit_all(atlas, shapes, _part(progress, 0.0, 0.5), should_stop)
-    distances, components = [], []
-    for done, (shape, latent) in enumerate(zip(shapes, latents, strict=True), start=1):
-        fitted = atlas.shape(
-            shape.values, latent, config.resolution, extrapolate=True, should_stop=should_stop
-        )
+    latents = fit_all(atlas, shapes, _part(progress, 0.0, 0.2), should_stop)
+    given = [(shape.values, latent) for shape, latent in zip(shapes, latents, strict=True)]
+    inferred = infer_all(atlas, shapes, _part(progress, 0.2, 0.5), should_stop)
+    found: list[Distances | None] = []
+    components = []
+    for done, ((values, latent), shape) in enumerate(zip(given + inferred, shapes * 2, strict=True), start=1):
+        fitted = atlas.shape(values, latent, config.resolution, extrapolate=True, should_stop=should_stop)
         components.append(component_count(fitted))
-        if len(fitted.faces):
-            distances.append(compare(shape.mesh_mm, fitted))
-        _tell(progress, 0.5 + 0.2 * done / len(shapes))
+        found.append(compare(shape.mesh_mm, fitted) if len(fitted.faces) else None)
+        _tell(progress, 0.5 + 0.2 * done / (2 * len(shapes)))
     growth, effects, template = truth_points(
         atlas, config.resolution, _part(progress, 0.7, 0.85), should_stop
     )
     latest = _part(progress, 0.85, 1.0)
     plausible, corners = population_components(atlas, config.check_resolution, latest, should_stop)
     return reconstruction_report(
-        distances,
+        _there(found[: len(shapes)]),
+        inferred=_there(found[len(shapes) :]),
         components=components + plausible,
         folded_share=folded_share(atlas),
         growth=growth,
@@ -102,33 +112,62 @@ def evaluate(
         template=template,
         corner_components=corners,
         mean_displacement_mm=mean_displacement_mm(atlas, shapes[0].mesh_mm),
-        without_surface=len(shapes) - len(distances),
+        without_surface=found.count(None),
     )
 
 
-def held_out_shapes(atlas: Atlas, store: SampleStore | None, limit: int | None = None) -> list[HeldOut]:
+def _there(found: Sequence[Distances | None]) -> list[Distances]:
+    return [distances for distances in found if distances is not None]
+
+
+def held_out_shapes(
+    atlas: Atlas,
+    store: SampleStore | None,
+    limit: int | None = None,
+    subjects: Collection[str] | None = None,
+) -> list[HeldOut]:
     """The first held-out shapes of a store, or of the synthetic population that the atlas was made from.
+
+    Args:
+        atlas: what was trained.
+        store: what it was trained on; None where the population can be made again.
+        limit: at most so many shapes.
+        subjects: whose shapes count; None for all.
 
     Raises:
         InputError: when the atlas was made from somebody's own data and no store, or another, is given.
     """
+    people = atlas.population
+    rows = [int(row) for row in np.flatnonzero(people.held_out)]
+    rows = [row for row in rows if subjects is None or people.subjects[row] in subjects][:limit]
     if store is not None:
         _require_same_data(atlas, store)
-        rows = np.flatnonzero(store.population.held_out)[:limit]
-        return [HeldOut(store.population.row(int(row)), store.mesh(int(row))) for row in rows]
+        meshes = {
+            (store.population.subjects[i], store.population.visits[i]): i
+            for i in range(len(store.population))
+        }
+        places = [(people.subjects[row], people.visits[row]) for row in rows]
+        return [
+            HeldOut(people.row(row), store.mesh(meshes[place]), *place)
+            for row, place in zip(rows, places, strict=True)
+        ]
     module = synthetic(atlas)
     if module is None:
         raise InputError(
             "this atlas was made from data of your own; give the store it was trained on with --store"
         )
-    source = atlas.checkpoint.source
-    held_out = _held_out_visits(atlas.population)[:limit]
-    visits = module.visits(int(source["seed"]), int(source["patients"]))
+    visits = source_visits(atlas, module)
     return [
-        HeldOut(dict(visit.values), aligned(atlas, *module.visit_shape(visit)))
-        for visit in visits
-        if (visit.subject, visit.visit) in held_out
+        HeldOut(dict(visit.values), aligned(atlas, *module.visit_shape(visit)), visit.subject, visit.visit)
+        for visit in (visits[people.subjects[row], people.visits[row]] for row in rows)
     ]
+
+
+def source_visits(atlas: Atlas, module: PopulationModule) -> dict[tuple[str, str], PopulationVisit]:
+    """Everybody in the synthetic population that an atlas records as its source, by subject and visit."""
+    source = atlas.checkpoint.source
+    visits = module.visits(int(source["seed"]), int(source["patients"]))
+    return {(visit.subject, visit.visit): visit for visit in visits}
 
 
 def _require_same_data(atlas: Atlas, store: SampleStore) -> None:
@@ -148,6 +187,11 @@ def _require_same_data(atlas: Atlas, store: SampleStore) -> None:
 def _held_out_visits(population: Population) -> list[tuple[str, str]]:
     rows = np.flatnonzero(population.held_out)
     return [(population.subjects[row], population.visits[row]) for row in rows]
+
+
+def is_inside(population: Population, values: Values) -> bool:
+    """Whether all covariates are inside their observed ranges, so that a fit takes them as known."""
+    return all(c.range[0] <= values[c.name] <= c.range[1] for c in population.covariates)
 
 
 def synthetic(atlas: Atlas) -> PopulationModule | None:
@@ -173,14 +217,39 @@ def fit_all(
     should_stop: StopCheck | None = None,
 ) -> NDArray[np.float64]:
     """Codes of all shapes at their known covariates, ``[n, L]``."""
+    known = [normalised_vector(atlas.covariates, shape.values) for shape in shapes]
+    return np.stack([fit.latent for fit in _fits(atlas, shapes, known, progress, should_stop)])
+
+
+def infer_all(
+    atlas: Atlas,
+    shapes: Sequence[HeldOut],
+    progress: Progress | None = None,
+    should_stop: StopCheck | None = None,
+) -> list[tuple[dict[str, float], NDArray[np.float64]]]:
+    """Covariates in real units and code of each shape, nothing being known of it."""
+    unknown = [np.full(len(atlas.covariates), np.nan)] * len(shapes)
+    return [
+        ({c.name: float(c.restore(fit.covariates[i])) for i, c in enumerate(atlas.covariates)}, fit.latent)
+        for fit in _fits(atlas, shapes, unknown, progress, should_stop)
+    ]
+
+
+def _fits(
+    atlas: Atlas,
+    shapes: Sequence[HeldOut],
+    known: Sequence[NDArray[np.float64]],
+    progress: Progress | None,
+    should_stop: StopCheck | None,
+) -> list[ShapeFit]:
     network = atlas.checkpoint.network().requires_grad_(False)
-    prior, codes = prior_of(atlas.population, atlas.checkpoint.latents), []
-    for done, shape in enumerate(shapes, start=1):
+    prior, fits = prior_of(atlas.population, atlas.checkpoint.latents), []
+    binary = [i for i, covariate in enumerate(atlas.covariates) if covariate.kind == "binary"]
+    for done, (shape, vector) in enumerate(zip(shapes, known, strict=True), start=1):
         target = target_of(shape.mesh_mm, atlas.frame)
-        known = normalised_vector(atlas.covariates, shape.values)
-        codes.append(fit_shape(network, target, prior, known, should_stop=should_stop)[0].latent)
+        fits.append(fit_shape(network, target, prior, vector, binary, should_stop=should_stop)[0])
         _tell(progress, done / len(shapes))
-    return np.stack(codes)
+    return fits
 
 
 def truth_points(
