@@ -8,6 +8,7 @@ import signal
 import sys
 import time
 from collections.abc import Mapping, Sequence
+from functools import partial
 from importlib.resources import as_file, files
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -16,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated
 import cyclopts
 from cyclopts import Parameter
 
-from naisr_viewer.engine import VERSION, Engine, InputError
+from naisr_viewer.engine import VERSION, Engine, InputError, load_atlas
 
 if TYPE_CHECKING:
     from PySide6.QtWidgets import QApplication
@@ -63,10 +64,12 @@ def view(
     /,
     *,
     settings: Annotated[list[str] | None, Parameter("--set", negative=())] = None,
+    scan: Path | None = None,
     screenshot: Path | None = None,
     demo: Path | None = None,
     measure: Path | None = None,
     size: str = "1280x800",
+    device: str = "cpu",
 ) -> int:
     """Open the window on an atlas.
 
@@ -76,6 +79,8 @@ def view(
         A trained atlas (.safetensors); the airway atlas that comes with the program when left out.
     settings
         Where a covariate starts, as NAME=VALUE in real units: --set age=120 --set sex=M.
+    scan
+        A patient's file to open at once: a mesh, a label volume or a cloud of points.
     screenshot
         Write a picture of the window to this PNG file and end; needs no display.
     demo
@@ -86,6 +91,8 @@ def view(
         needs no display.
     size
         Size of the window in pixels, WIDTHxHEIGHT.
+    device
+        Where exact surfaces are computed: cpu, cuda or mps.
     """
     path = (atlas or default_atlas()).absolute()
     pixels = parse_size(size)
@@ -93,14 +100,14 @@ def view(
         raise InputError(f"there is no file {path}; give the path of an atlas (.safetensors)")
     leave_a_core_to_the_window()
     gc.set_threshold(50_000)  # imports make many objects that stay: seldom worth looking through
-    engine = Engine()
+    engine = Engine(partial(load_atlas, device=device))
     if measure is not None:
         return _measured(engine, path, pixels, measure)
     card = engine.open(path) if settings or screenshot or demo else None
     values = parse_settings(card, settings or []) if card else {}
     if card is not None and (screenshot or demo):
-        return _unattended(engine, card, values, pixels, screenshot, demo)
-    return _attended(engine, path, card, values, pixels)
+        return _unattended(engine, card, values, scan, pixels, screenshot, demo)
+    return _attended(engine, path, card, values, scan, pixels)
 
 
 def leave_a_core_to_the_window() -> None:
@@ -158,7 +165,9 @@ def make_window(engine: Engine, settings_file: Path | None = None) -> tuple[Main
     """
     from PySide6.QtCore import QSettings
 
+    from naisr_viewer.clinic import Clinic
     from naisr_viewer.controller import Controller
+    from naisr_viewer.desk import PatientDesk
     from naisr_viewer.views.main_window import MainWindow
     from naisr_viewer.worker import Worker
 
@@ -167,7 +176,9 @@ def make_window(engine: Engine, settings_file: Path | None = None) -> tuple[Main
     else:
         settings = QSettings(str(settings_file), QSettings.Format.IniFormat)
     window = MainWindow()
-    return window, Controller(window, engine, Worker(), Worker(), settings)
+    controller = Controller(window, engine, Worker(), Worker(), settings)
+    PatientDesk(window, controller, Clinic(engine))  # the controller owns it
+    return window, controller
 
 
 def make_application() -> QApplication:
@@ -182,9 +193,16 @@ def make_application() -> QApplication:
 
 
 def _attended(
-    engine: Engine, path: Path, card: AtlasCard | None, values: Mapping[str, float], pixels: tuple[int, int]
+    engine: Engine,
+    path: Path,
+    card: AtlasCard | None,
+    values: Mapping[str, float],
+    scan: Path | None,
+    pixels: tuple[int, int],
 ) -> int:
     """The window in the hands of a person, until it is closed."""
+    from PySide6.QtCore import Qt
+
     from naisr_viewer.display import has_display
 
     if not has_display():
@@ -192,6 +210,9 @@ def _attended(
     app = make_application()
     window, controller = make_window(engine)
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # so that Ctrl+C in the terminal ends the program
+    if scan is not None:
+        once = Qt.ConnectionType.SingleShotConnection
+        controller.settled.connect(lambda: window.scan_requested.emit(scan), once)
     _show(window, controller, path, card, values, pixels)
     return app.exec()
 
@@ -246,6 +267,7 @@ def _unattended(
     engine: Engine,
     card: AtlasCard,
     values: Mapping[str, float],
+    scan: Path | None,
     pixels: tuple[int, int],
     screenshot: Path | None,
     demo: Path | None,
@@ -262,6 +284,9 @@ def _unattended(
         window.show()
         try:
             controller.show_atlas(card, values)
+            if scan is not None:
+                headless.finish(window, controller)
+                window.scan_requested.emit(scan)
             if screenshot is not None:
                 headless.take_screenshot(window, controller, screenshot)
             if demo is not None:

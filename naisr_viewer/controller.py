@@ -9,9 +9,10 @@ from enum import Enum, auto
 from pathlib import Path
 from types import MappingProxyType, TracebackType
 
-from PySide6.QtCore import QObject, QSettings, QTimer, Signal
+from PySide6.QtCore import QObject, QSettings, Qt, QTimer, Signal
 
 from naisr_viewer import export
+from naisr_viewer.captions import caption
 from naisr_viewer.engine import VERSION, Cancelled, Engine, InputError
 from naisr_viewer.requests import (
     EXACT_RESOLUTION,
@@ -21,6 +22,7 @@ from naisr_viewer.requests import (
     SurfaceRequest,
     SurfaceResult,
     answers,
+    request_for,
 )
 from naisr_viewer.state import (
     AtlasCard,
@@ -28,15 +30,14 @@ from naisr_viewer.state import (
     History,
     Layout,
     Panel,
-    is_seen,
+    followed,
     opened,
-    panel_values,
     record,
     redo,
+    reset,
+    reset_all,
     undo,
     visible_panels,
-    with_all_centred,
-    with_centre,
     with_value,
 )
 from naisr_viewer.views.main_window import MainWindow
@@ -47,15 +48,6 @@ PATIENCE_MS = 1000
 """Work shorter than this shows no progress bar."""
 
 RECENT_FILES = 8
-DOUBTFUL = "preview uncertain"
-DOUBTFUL_HINT = (
-    "The deformation folds here, so the preview may lack or invent pieces; the exact surface follows at rest."
-)
-UNSEEN = "outside the data"
-UNSEEN_HINT = (
-    "Hardly anyone behind the atlas is near this combination of covariates (those not moved here are at "
-    "their mean), so the shape is a guess."
-)
 
 
 class Task(Enum):
@@ -66,6 +58,12 @@ class Task(Enum):
     PREVIEW = auto()
     EXACT = auto()
     EXPORT = auto()
+    READING = auto()
+    FITTING = auto()
+
+
+UNDIVIDED = (Task.OPENING, Task.EXPORT, Task.READING, Task.FITTING)
+"""What the worker finishes, or is told to stop, before it computes surfaces again."""
 
 
 @dataclass(frozen=True)
@@ -94,6 +92,7 @@ class Controller(QObject):
     """
 
     settled = Signal()  # everything on screen is exact, or the computation ended otherwise
+    produced = Signal(object)  # a job that was started from outside handed this over
 
     def __init__(
         self, window: MainWindow, engine: Engine, worker: Worker, background: Worker, settings: QSettings
@@ -108,7 +107,7 @@ class Controller(QObject):
         self._task = Task.NOTHING
         self._halted = ""
         self._notice = ""
-        self._preparing: Path | None = None
+        self._preparing: tuple[Path, int] | None = None
         self._patience = QTimer(self, singleShot=True, interval=PATIENCE_MS)
         self._connect()
         window.show_recent(self._recent())
@@ -119,6 +118,11 @@ class Controller(QObject):
     def is_moving(self) -> bool:
         """Whether the user is in the middle of changing a covariate."""
         return self._before_move is not None
+
+    @property
+    def is_occupied(self) -> bool:
+        """Whether the worker does something else than surfaces."""
+        return self._task in UNDIVIDED
 
     @property
     def is_busy(self) -> bool:
@@ -135,10 +139,15 @@ class Controller(QObject):
         ) -> None:
             deliver(self._engine.open(path.absolute()))
 
-        self._window.show_error("")
         self._window.show_opening(path.name)
-        self._window.show_status(f"Opening {path.name} …")
-        self._start(Task.OPENING, job)
+        self.run(Task.OPENING, f"Opening {path.name} …", job)
+
+    def run(self, task: Task, status: str, job: Job) -> None:
+        """Give the worker something else than surfaces to do; the covariates rest meanwhile."""
+        self._window.show_error("")
+        self._window.set_editable(False)
+        self._window.show_status(status)
+        self._start(task, job)
 
     def show_atlas(self, card: AtlasCard, values: Mapping[str, float] = MappingProxyType({})) -> None:
         """Show an atlas that is open in the engine; covariates left out are at their mean."""
@@ -150,30 +159,29 @@ class Controller(QObject):
         state = opened(self.state, card)
         for name, value in values.items():
             state = with_value(state, name, value)
-        self._go(state)
+        self.go(state)
 
     def export(self, choice: ExportChoice) -> None:
         """Write surfaces at the present values; what is missing is computed first."""
         atlas = self.state.atlas
         if atlas is None:
             return
-        requests = [self._request(panel, choice.resolution) for panel in choice.panels]
+        state = self.state
+        requests = [request_for(state, panel, choice.resolution) for panel in choice.panels]
+        owners = [state.shown if request.person else None for request in requests]
 
         def job(
             deliver: Callable[[object], None],
             progress: Callable[[float], None],
             should_stop: Callable[[], bool],
         ) -> None:
-            for place, request in enumerate(requests):
+            for place, (request, owner) in enumerate(zip(requests, owners, strict=True)):
                 result = self._engine.surface(request, _part(progress, place, len(requests)), should_stop)
-                path = choice.folder / f"{export.file_stem(atlas, result)}.{choice.format}"
-                export.write_surface(path, result, atlas)
+                path = choice.folder / f"{export.file_stem(atlas, result, owner)}.{choice.format}"
+                export.write_surface(path, result, atlas, owner)
             deliver(ExportReport(len(requests), choice))
 
-        self._window.show_error("")
-        self._window.set_editable(False)
-        self._window.show_status(f"Exporting into {choice.folder} …")
-        self._start(Task.EXPORT, job)
+        self.run(Task.EXPORT, f"Exporting into {choice.folder} …", job)
 
     def save_screenshot(self, path: Path) -> None:
         """Write a picture of the whole window; the ending of ``path`` says which kind."""
@@ -196,22 +204,22 @@ class Controller(QObject):
         if self._before_move is None:
             self._before_move = self.state
             self._window.shapes.set_moving(True)
-        self._go(with_value(self.state, name, value))
+        self.go(self._moved(self._before_move, name, value))
 
     def settle(self, name: str, value: float) -> None:
         """A covariate came to rest; what lies behind is one step to undo."""
         before = self._before_move or self.state
         self._before_move = None
         self._window.shapes.set_moving(False)
-        self._commit(before, with_value(self.state, name, value))
+        self._commit(before, self._moved(before, name, value))
 
     def reset(self, name: str) -> None:
-        """One covariate to the population mean."""
-        self._commit(self.state, with_centre(self.state, name))
+        """One covariate to the patient's value, or to the population mean."""
+        self._commit(self.state, reset(self.state, name))
 
     def reset_all(self) -> None:
-        """All covariates to the population mean."""
-        self._commit(self.state, with_all_centred(self.state))
+        """All covariates to the patient's values, or to the population mean."""
+        self._commit(self.state, reset_all(self.state))
 
     def undo(self) -> None:
         """One change of the covariates back."""
@@ -223,7 +231,11 @@ class Controller(QObject):
 
     def set_layout(self, layout: Layout) -> None:
         """Show other sub-plots."""
-        self._go(replace(self.state, layout=layout))
+        self.go(replace(self.state, layout=layout))
+
+    def set_follow(self, follow: bool) -> None:
+        """Whether the other covariates follow the one that is moved."""
+        self.go(replace(self.state, follow=follow))
 
     def set_theme(self, choice: ThemeChoice) -> None:
         """Colour the window and remember it."""
@@ -261,10 +273,13 @@ class Controller(QObject):
         window.cancel_requested.connect(self.cancel)
         window.about_requested.connect(lambda: window.show_about(VERSION))
         window.closing.connect(self.shutdown)
+        # Queued, so that the picture has reached the screen before the networks' import slows it down.
+        window.shapes.drawn.connect(lambda _: self._prepare_previews(), Qt.ConnectionType.QueuedConnection)
         window.covariates.value_moved.connect(self.move)
         window.covariates.value_settled.connect(self.settle)
         window.covariates.reset_requested.connect(self.reset)
         window.covariates.reset_all_requested.connect(self.reset_all)
+        window.covariates.follow_toggled.connect(self.set_follow)
         worker.delivered.connect(self._delivered)
         worker.progressed.connect(self._progressed)
         worker.failed.connect(self._failed)
@@ -274,32 +289,52 @@ class Controller(QObject):
 
     def _commit(self, before: ExplorerState, after: ExplorerState) -> None:
         self._history = record(self._history, before.values, after.values)
-        self._go(after)
+        self.go(after)
 
     def _travel(self, history: History, values: tuple[float, ...]) -> None:
         self._history = history
-        self._go(replace(self.state, values=values))
+        self.go(replace(self.state, values=values))
 
-    def _go(self, state: ExplorerState) -> None:
+    def _moved(self, before: ExplorerState, name: str, value: float) -> ExplorerState:
+        state = with_value(self.state, name, value)
+        return followed(state, name, before.values) if state.follow else state
+
+    def go(self, state: ExplorerState) -> None:
         """Make ``state`` the present one."""
+        if (state.patient, state.person) != (self.state.patient, self.state.person):
+            self._leave()
         self.state = state
         self._halted = self._notice = ""
         self._window.show_state(state)
+        self._clear_others()
         self._window.show_history(bool(self._history.past), bool(self._history.future))
         self._refresh()
 
-    def _request(self, panel: Panel, resolution: int) -> SurfaceRequest:
-        assert self.state.atlas is not None
-        return SurfaceRequest(self.state.atlas.path, panel, panel_values(self.state, panel), resolution)
+    def _leave(self) -> None:
+        """Another patient comes; what was done to the covariates of the last one ends here."""
+        self._history = History()
+        self._before_move = None
+        self._window.shapes.set_moving(False)
+        self._window.covariates.forget_moves()
+
+    def _clear_others(self) -> None:
+        """Take surfaces of somebody else from the screen; an empty view is honest."""
+        for panel, result in list(self.shown.items()):
+            wanted = request_for(self.state, panel, 0)
+            if wanted.person != result.request.person:
+                del self.shown[panel]
+                self._window.shapes.clear_surface(panel)
 
     def _missing(self, resolution: int) -> list[SurfaceRequest]:
         """What is not on screen at ``resolution`` yet, the full shape first."""
-        wanted = [self._request(panel, resolution) for panel in reversed(visible_panels(self.state))]
+        wanted = [
+            request_for(self.state, panel, resolution) for panel in reversed(visible_panels(self.state))
+        ]
         return [request for request in wanted if not answers(self.shown.get(request.panel), request)]
 
     def _refresh(self) -> None:
         """Show what is remembered and set the worker on what is missing."""
-        if self._task in (Task.OPENING, Task.EXPORT) or self.state.atlas is None:
+        if self._task in UNDIVIDED or self.state.atlas is None:
             return
         for resolution in (EXACT_RESOLUTION, PREVIEW_RESOLUTION):
             for request in self._missing(resolution):
@@ -338,18 +373,23 @@ class Controller(QObject):
 
     def _prepare_previews(self) -> None:
         """Make previews of the open atlas fast, once everything that somebody waits for is done."""
-        atlas, engine = self.state.atlas, self._engine
-        if atlas is None or self._preparing == atlas.path or engine.has_previews(atlas.path):
+        atlas, person, engine = self.state.atlas, self.state.person, self._engine
+        if atlas is None or self.is_busy or not self._window.shapes.is_ready:
             return
-        path = self._preparing = atlas.path
-
+        if self._preparing == (atlas.path, person):
+            return
+        self._preparing = (atlas.path, person)
+        if engine.has_previews(atlas.path, person):
+            return
         self._background.cancel()
         self._background.submit(
-            lambda _, progress, should_stop: engine.prepare_previews(path, progress, should_stop)
+            lambda _, progress, should_stop: engine.prepare_previews(
+                atlas.path, person, progress, should_stop
+            )
         )
 
     def _start(self, task: Task, job: Job) -> None:
-        if task in (Task.OPENING, Task.EXPORT):
+        if task in UNDIVIDED:
             self._worker.cancel()
         self._task = task
         if task is Task.PREVIEW:
@@ -368,33 +408,24 @@ class Controller(QObject):
             for result in filter(self._is_wanted, item):
                 self._show(result)
             self._show_status()
+        else:
+            self.produced.emit(item)
 
     def _is_wanted(self, result: SurfaceResult) -> bool:
         """Whether a result still belongs on screen; while moving, the way there does too."""
         asked, panel = result.request, result.request.panel
-        if panel not in visible_panels(self.state) or asked.atlas != self._request(panel, 0).atlas:
+        if panel not in visible_panels(self.state):
             return False
-        if answers(self.shown.get(panel), self._request(panel, asked.resolution)):
+        wanted = request_for(self.state, panel, asked.resolution)
+        if answers(self.shown.get(panel), wanted):
             return False
-        return self.is_moving or asked.values == panel_values(self.state, panel)
+        return asked == (replace(wanted, values=asked.values) if self.is_moving else wanted)
 
     def _show(self, result: SurfaceResult) -> None:
         panel = result.request.panel
         self.shown[panel] = result
         self._window.shapes.show_surface(result)
-        self._window.shapes.set_caption(panel, *self._caption(result))
-
-    def _caption(self, result: SurfaceResult) -> tuple[str, str]:
-        assert self.state.atlas is not None
-        if len(result.faces) == 0:
-            return "no surface at these values", "The signed distance is nowhere zero inside the box."
-        digits = 1 if result.volume_cm3 < 1000 else 0
-        text = f'<span style="font-size:12pt">{result.volume_cm3:,.{digits}f} cm³</span>'
-        if result.doubtful:
-            return f"{text}<br>{DOUBTFUL}", DOUBTFUL_HINT
-        if is_seen(self.state.atlas.population, dict(result.request.values)):
-            return text, "Enclosed volume"
-        return f"{text}<br>{UNSEEN}", UNSEEN_HINT
+        self._window.shapes.set_caption(panel, *caption(self.state, result))
 
     def _progressed(self, fraction: float) -> None:
         if not self._patience.isActive() and self._task is not Task.PREVIEW:
@@ -415,8 +446,9 @@ class Controller(QObject):
         was, self._task = self._task, Task.NOTHING
         if was is Task.OPENING:
             self._window.show_opening("")
-        if was is Task.EXPORT:
+        if was in UNDIVIDED:
             self._window.set_editable(True)
+            self._window.show_state(self.state)  # choices that came to nothing are taken back
         if not self._halted:
             self._refresh()
         if self._task is Task.NOTHING:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from naisr_viewer.engine import VERSION, InputError
+from naisr_viewer.patients import Patient
 from naisr_viewer.requests import FORMATS, SurfaceResult
 from naisr_viewer.state import AtlasCard, Covariate, panel_title
 
@@ -38,13 +39,16 @@ def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
         Path(name).unlink(missing_ok=True)
 
 
-def write_surface(path: Path, result: SurfaceResult, atlas: AtlasCard) -> tuple[Path, Path]:
+def write_surface(
+    path: Path, result: SurfaceResult, atlas: AtlasCard, patient: Patient | None = None
+) -> tuple[Path, Path]:
     """Write a surface and, beside it, a JSON record of what it shows.
 
     Args:
         path: the mesh file; its ending is one of :data:`FORMATS`.
         result: the surface, in millimetres.
         atlas: where it came from.
+        patient: whose it is; None for the population average.
 
     Returns:
         The mesh file and the record.
@@ -61,14 +65,16 @@ def write_surface(path: Path, result: SurfaceResult, atlas: AtlasCard) -> tuple[
         raise InputError(f"cannot write '{path.name}'; the ending must be one of {', '.join(FORMATS)}")
     beside = path.with_suffix(".json")
     write_atomically(path, lambda place: _write_mesh(place, ending, result))
-    text = json.dumps(description(result, atlas, path.name), indent=2, ensure_ascii=False) + "\n"
+    text = json.dumps(description(result, atlas, path.name, patient), indent=2, ensure_ascii=False) + "\n"
     write_atomically(beside, lambda place: place.write_text(text, encoding="utf-8"))
     return path, beside
 
 
-def description(result: SurfaceResult, atlas: AtlasCard, file_name: str) -> dict[str, Any]:
+def description(
+    result: SurfaceResult, atlas: AtlasCard, file_name: str, patient: Patient | None = None
+) -> dict[str, Any]:
     """What a mesh file shows, as plain JSON."""
-    request = result.request
+    request, margin = result.request, result.volume_margin_cm3
     given = dict(request.values)
     return {
         "file": file_name,
@@ -79,6 +85,8 @@ def description(result: SurfaceResult, atlas: AtlasCard, file_name: str) -> dict
         "depends_on": sorted(given),
         "length_unit": "mm",
         "volume_cm3": round(result.volume_cm3, 4),
+        "volume_95_percent_margin_cm3": None if margin is None else round(margin, 4),
+        "patient": None if patient is None else _patient_record(patient),
         "vertices": len(result.points_mm),
         "triangles": len(result.faces),
         "lattice_resolution": request.resolution,
@@ -86,9 +94,29 @@ def description(result: SurfaceResult, atlas: AtlasCard, file_name: str) -> dict
     }
 
 
-def file_stem(atlas: AtlasCard, result: SurfaceResult) -> str:
-    """A telling file name without an ending: ``airway-age-only``."""
-    return f"{atlas.name}-{panel_title(result.request.panel)}".lower().replace(" ", "-").replace("/", "-")
+def file_stem(atlas: AtlasCard, result: SurfaceResult, patient: Patient | None = None) -> str:
+    """A telling file name without an ending: ``airway-age-only``, ``airway-p01-full-shape``."""
+    person = "" if patient is None else f"{_plain_name(patient)}-"
+    words = f"{atlas.name}-{person}{panel_title(result.request.panel)}".lower()
+    return "-".join(words.replace("/", " ").split())
+
+
+def _plain_name(patient: Patient) -> str:
+    """The name without the file's ending and without parentheses: ``p01.stl (2)`` is ``p01 2``."""
+    file = patient.reading.path.name
+    stem = file.removesuffix(".gz").rpartition(".")[0] or file
+    return patient.name.replace(file, stem).replace("(", "").replace(")", "")
+
+
+def _patient_record(patient: Patient) -> dict[str, Any]:
+    """Who it is, and what of the covariates is known of them; the rest was inferred."""
+    fit = patient.fit
+    return {
+        "scan": patient.reading.path.name,
+        "known": dict(patient.known),
+        "fitted": None if fit is None else dict(fit.values),
+        "residual_mm": None if fit is None else round(fit.residual_mm, 4),
+    }
 
 
 def _covariate_record(covariate: Covariate, value: float) -> dict[str, Any]:

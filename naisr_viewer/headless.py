@@ -9,11 +9,12 @@ from pathlib import Path
 from PySide6.QtCore import QCoreApplication, QEventLoop, QPoint, Qt
 from PySide6.QtTest import QTest
 
+from naisr_viewer import export
 from naisr_viewer.controller import Controller
 from naisr_viewer.engine import InputError
 from naisr_viewer.requests import EXACT_RESOLUTION, ExportChoice
-from naisr_viewer.state import Layout, all_panels
-from naisr_viewer.views.covariate_panel import HANDLE_PX, CovariateRow
+from naisr_viewer.state import FULL_SHAPE, Layout, all_panels
+from naisr_viewer.views.covariate_panel import HANDLE_PX, SLIDER_STEPS, CovariateRow
 from naisr_viewer.views.main_window import MainWindow
 
 DEADLINE_S = 600.0
@@ -80,6 +81,8 @@ def drag(row: CovariateRow, start: float, end: float) -> None:
 def run_demo(window: MainWindow, controller: Controller, folder: Path) -> None:
     """Drag every slider from end to end with real mouse events; leave pictures and meshes behind.
 
+    At last a full shape that was exported is opened as if it were a patient's, fitted and moved.
+
     Raises:
         InputError: when the window reports an error.
     """
@@ -97,9 +100,20 @@ def run_demo(window: MainWindow, controller: Controller, folder: Path) -> None:
         row.reset.click()
         print(f"dragged {name} from {row.reach}", flush=True)
     controller.set_layout(Layout.FULL_SHAPE)
+    name, row = next(iter(window.covariates.rows.items()))
+    drag(row, 0.5, 0.75)
     picture("full-shape")
     atlas = controller.state.atlas
     assert atlas is not None
     controller.export(ExportChoice(all_panels(atlas), "stl", EXACT_RESOLUTION, folder))
     finish(window, controller)
+    row.reset.click()
+    window.scan_requested.emit(folder / f"{export.file_stem(atlas, controller.shown[FULL_SHAPE])}.stl")
+    finish(window, controller)
+    window.patients.known.fit.click()
+    picture("patient-fit")
+    controller.set_layout(Layout.CHANGE)
+    drag(row, row.slider.sliderPosition() / SLIDER_STEPS, 0.25)
+    picture("patient-before-and-after")
+    print(f"fitted the exported full shape and moved it along {name}")
     print(f"wrote pictures and meshes into {folder.absolute()}")

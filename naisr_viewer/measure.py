@@ -4,6 +4,7 @@ What is written:
 
 - ``window_visible_s``: from the start of the process to the first painting of the window.
 - ``first_picture_s``: from the start of the process until all views are exact and painted.
+- ``first_picture_was_kept``: whether that picture's surface came from the cache of an earlier run.
 - ``previews_ready_s``: from the start of the process until previews are fast; null if that took too long.
 - ``covariate``, ``views``: whose slider was dragged, the others being off their centre, and how many
   sub-plots were on screen.
@@ -177,6 +178,7 @@ def measure(
     figures = {
         "window_visible_s": observer.appeared - started,
         "first_picture_s": first - started,
+        "first_picture_was_kept": engine.was_kept(atlas),
         "previews_ready_s": previews_ready_s,
         **_figures(observer, events, released, len(visible_panels(controller.state))),
     }
@@ -197,6 +199,8 @@ def _leave_the_centre(controller: Controller, observer: Observer) -> None:
 def _figures(
     observer: Observer, events: Sequence[tuple[float, float]], released: float, views: int
 ) -> dict[str, object]:
+    if not events:
+        raise InputError("the slider did not move while it was dragged; the machine is too busy to measure")
     during = [picture for picture in observer.pictures if events[0][0] <= picture.time <= released]
     after = [picture for picture in observer.pictures if picture.time > released]
     late = {picture.values for picture in after if any(value != events[-1][1] for value in picture.values)}

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, auto
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from naisr_viewer.state import Named, Panel
+from naisr_viewer.patients import Named
+from naisr_viewer.state import ExplorerState, Panel, panel_values
 
 PREVIEW_RESOLUTION = 40
 """Cells along a side of the box while a slider moves and displacements are not tabulated yet."""
@@ -37,12 +38,31 @@ class SurfaceRequest:
         panel: which of its surfaces.
         values: the covariate values (real units) the surface depends on.
         resolution: cells along a side of the box; below :data:`EXACT_RESOLUTION` a preview is wanted.
+        person: whose code; 0 for the population average.
+        before: of a change, person and covariate values that it is counted from.
     """
 
     atlas: Path
     panel: Panel
     values: Named
     resolution: int
+    person: int = 0
+    before: tuple[int, Named] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Colouring:
+    """Values shown as colours on a surface, with a fixed scale, so that pictures can be compared.
+
+    Attributes:
+        values_mm: one a vertex, float32 ``[n]``.
+        limit_mm: the end of the scale; values beyond it have its colour.
+        is_signed: whether the scale runs from ``-limit_mm`` to ``limit_mm``; else it begins at 0.
+    """
+
+    values_mm: NDArray[np.float32]
+    limit_mm: float
+    is_signed: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +80,9 @@ class SurfaceResult:
         doubtful: the deformation folds, so that a preview may lack or invent pieces.
         preview_error_mm: of an exact surface: the distance within which 99 % of the preview's vertices
             lay; None where there was no preview by tabulated displacements.
+        volume_margin_cm3: half of the volume's 95 % interval; None for the population average.
+        volume_before_cm3: of a change: the volume that it is counted from.
+        colouring: of a scan, a change or an uncertainty at rest; else None.
     """
 
     request: SurfaceRequest
@@ -71,6 +94,9 @@ class SurfaceResult:
     origin: Origin
     doubtful: bool = False
     preview_error_mm: float | None = None
+    volume_margin_cm3: float | None = None
+    volume_before_cm3: float | None = None
+    colouring: Colouring | None = None
 
     @property
     def is_exact(self) -> bool:
@@ -78,15 +104,25 @@ class SurfaceResult:
         return self.origin is Origin.NETWORK and self.request.resolution >= EXACT_RESOLUTION
 
 
+def request_for(state: ExplorerState, panel: Panel, resolution: int) -> SurfaceRequest:
+    """The surface that ``panel`` shows in ``state``; there is an atlas."""
+    assert state.atlas is not None
+    person, before, reference = state.person, None, state.reference
+    if panel.kind == "template":
+        person = 0
+    if panel.kind == "before" and reference is not None:
+        person = reference.person
+    if panel.kind == "change" and reference is not None:
+        before = reference.person, reference.values
+    values = panel_values(state, panel)
+    return SurfaceRequest(state.atlas.path, panel, values, resolution, person, before)
+
+
 def answers(result: SurfaceResult | None, request: SurfaceRequest) -> bool:
     """Whether ``result`` shows what ``request`` asks for, at least as finely."""
-    return (
-        result is not None
-        and result.request.atlas == request.atlas
-        and result.request.panel == request.panel
-        and result.request.values == request.values
-        and result.request.resolution >= request.resolution
-    )
+    if result is None or result.request.resolution < request.resolution:
+        return False
+    return replace(result.request, resolution=request.resolution) == request
 
 
 @dataclass(frozen=True)

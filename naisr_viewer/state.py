@@ -7,14 +7,13 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from naisr_model.covariates import Covariate, Population
-
-if TYPE_CHECKING:
-    from scipy.spatial import cKDTree
+from naisr_model.covariates import Covariate, Population, growth_path
+from naisr_viewer.patients import Fitted, Named, Patient
 
 UNDO_DEPTH = 200
 """How many covariate changes are remembered."""
@@ -31,27 +30,41 @@ LEAST_SPREAD = 0.05
 Values = tuple[float, ...]
 """Real covariate values in the atlas's covariate order."""
 
-Named = tuple[tuple[str, float], ...]
-"""Real covariate values by name, hashable."""
-
 
 class Layout(StrEnum):
     """How the sub-plots share the window."""
 
     SIDE_BY_SIDE = "side by side"
     FULL_SHAPE = "full shape"
+    FIT = "fit"
+    CHANGE = "before and after"
 
 
 @dataclass(frozen=True)
 class Panel:
-    """One sub-plot: the template, the shape moved by one covariate alone, or the full shape."""
+    """One sub-plot.
 
-    kind: Literal["template", "effect", "shape"]
+    The template, the shape moved by one covariate alone, or the full shape; and of a patient the scan
+    with its distance to the full shape, the full shape with its uncertainty, the shape that is compared
+    with (before), and the full shape with its change since then.
+    """
+
+    kind: Literal["template", "effect", "shape", "scan", "certainty", "before", "change"]
     covariate: str = ""
 
 
 TEMPLATE = Panel("template")
 FULL_SHAPE = Panel("shape")
+SCAN = Panel("scan")
+CERTAINTY = Panel("certainty")
+BEFORE = Panel("before")
+CHANGE = Panel("change")
+
+OF_A_PATIENT = {
+    Layout.FIT: (FULL_SHAPE, SCAN, CERTAINTY),
+    Layout.CHANGE: (BEFORE, FULL_SHAPE, CHANGE),
+}
+"""Layouts that need a fitted patient, and what they show."""
 
 
 @dataclass(frozen=True)
@@ -88,22 +101,65 @@ class ExplorerState:
         atlas: the open atlas, or None before the first one.
         values: real covariate values in the atlas's order.
         layout: which sub-plots are on screen.
+        follow: whether the other covariates follow one that is moved, as they do in the population.
+        patients: the scans that are open.
+        patient: key of the one that is shown; None for the population average.
+        compared: key of the one that is compared with; None for the patient as fitted.
+        has_ghost: whether the scan is drawn over the full shape.
     """
 
     atlas: AtlasCard | None = None
     values: Values = ()
     layout: Layout = Layout.SIDE_BY_SIDE
+    follow: bool = False
+    patients: tuple[Patient, ...] = ()
+    patient: int | None = None
+    compared: int | None = None
+    has_ghost: bool = True
 
     @property
     def named(self) -> Named:
         """The covariate values with their names."""
+        return self.with_names(self.values)
+
+    @property
+    def shown(self) -> Patient | None:
+        """The patient that is shown."""
+        return next((each for each in self.patients if each.key == self.patient), None)
+
+    @property
+    def fit(self) -> Fitted | None:
+        """The fit of the patient that is shown."""
+        return self.shown.fit if self.shown else None
+
+    @property
+    def reference(self) -> Fitted | None:
+        """The fit that is compared with."""
+        other = next((each for each in self.patients if each.key == self.compared), None)
+        return (other and other.fit) or self.fit
+
+    @property
+    def person(self) -> int:
+        """Whose code the surfaces have; 0 for the population average."""
+        return self.fit.person if self.fit else 0
+
+    @property
+    def home(self) -> Values:
+        """Where the covariates are reset to: the patient's, or the population mean."""
+        if self.fit is not None:
+            return tuple(value for _, value in self.fit.values)
+        return self.atlas.centre if self.atlas else ()
+
+    def with_names(self, values: Values) -> Named:
+        """Values in the atlas's order with their names."""
         names = [covariate.name for covariate in self.atlas.covariates] if self.atlas else []
-        return tuple(zip(names, self.values, strict=True))
+        return tuple(zip(names, values, strict=True))
 
 
 def opened(state: ExplorerState, atlas: AtlasCard) -> ExplorerState:
-    """``atlas`` at its population mean."""
-    return replace(state, atlas=atlas, values=atlas.centre)
+    """``atlas`` at its population mean, without patients."""
+    layout = Layout.SIDE_BY_SIDE if state.layout in OF_A_PATIENT else state.layout
+    return ExplorerState(atlas, atlas.centre, layout, follow=state.follow, has_ghost=state.has_ghost)
 
 
 def with_value(state: ExplorerState, name: str, value: float) -> ExplorerState:
@@ -115,15 +171,56 @@ def with_value(state: ExplorerState, name: str, value: float) -> ExplorerState:
     return replace(state, values=(*state.values[:index], held, *state.values[index + 1 :]))
 
 
-def with_centre(state: ExplorerState, name: str) -> ExplorerState:
-    """One covariate back at the population mean."""
+def followed(state: ExplorerState, name: str, start: Values) -> ExplorerState:
+    """The other continuous covariates moved along with ``name``, as in the population.
+
+    What each was off the population's path at ``start``, where the movement began, it stays.
+    """
     assert state.atlas is not None
-    return with_value(state, name, state.atlas.covariates[state.atlas.index(name)].centre)
+    index = state.atlas.index(name)
+    path = growth_path(state.atlas.population, name, np.array([start[index], state.values[index]]))
+    result = state
+    for i, covariate in enumerate(state.atlas.covariates):
+        if i != index and covariate.kind == "continuous":
+            result = with_value(result, covariate.name, start[i] + float(path[1, i] - path[0, i]))
+    return result
 
 
-def with_all_centred(state: ExplorerState) -> ExplorerState:
-    """Every covariate back at the population mean."""
-    return replace(state, values=state.atlas.centre) if state.atlas else state
+def reset(state: ExplorerState, name: str) -> ExplorerState:
+    """One covariate back home."""
+    assert state.atlas is not None
+    return with_value(state, name, state.home[state.atlas.index(name)])
+
+
+def reset_all(state: ExplorerState) -> ExplorerState:
+    """Every covariate back home."""
+    return replace(state, values=state.home)
+
+
+def with_patient(state: ExplorerState, patient: Patient) -> ExplorerState:
+    """A patient opened, or changed where the key is known, and shown."""
+    others = [each for each in state.patients if each.key != patient.key]
+    patients = tuple(sorted((*others, patient), key=lambda each: each.key))
+    return showing(replace(state, patients=patients), patient.key)
+
+
+def without_patient(state: ExplorerState, key: int) -> ExplorerState:
+    """A patient closed; the last of the others is shown."""
+    rest = tuple(each for each in state.patients if each.key != key)
+    compared = None if state.compared == key else state.compared
+    state = replace(state, patients=rest, compared=compared)
+    return showing(state, rest[-1].key if rest else None) if state.patient == key else state
+
+
+def showing(state: ExplorerState, key: int | None) -> ExplorerState:
+    """Another patient, at what is known or found of them; None for the population average."""
+    state = replace(state, patient=key)
+    if state.fit is None and state.layout in OF_A_PATIENT:
+        state = replace(state, layout=Layout.SIDE_BY_SIDE)
+    state = replace(state, values=state.home)
+    for name, value in state.shown.known if state.shown and not state.fit else ():
+        state = with_value(state, name, value)
+    return state
 
 
 def all_panels(atlas: AtlasCard) -> tuple[Panel, ...]:
@@ -136,26 +233,22 @@ def visible_panels(state: ExplorerState) -> tuple[Panel, ...]:
     """The panels of the present layout; none without an atlas."""
     if state.atlas is None:
         return ()
+    if state.layout in OF_A_PATIENT:
+        return OF_A_PATIENT[state.layout]
     return (FULL_SHAPE,) if state.layout is Layout.FULL_SHAPE else all_panels(state.atlas)
 
 
 def panel_values(state: ExplorerState, panel: Panel) -> Named:
     """The covariate values that ``panel`` depends on, and no others."""
-    if panel.kind == "effect":
-        return tuple(item for item in state.named if item[0] == panel.covariate)
-    return state.named if panel.kind == "shape" else ()
-
-
-def changed_panels(old: ExplorerState, new: ExplorerState) -> tuple[Panel, ...]:
-    """The panels on screen in ``new`` whose surface differs from that in ``old``."""
-    if old.atlas is not new.atlas:
-        return visible_panels(new)
-    before = set(visible_panels(old))
-    return tuple(
-        panel
-        for panel in visible_panels(new)
-        if panel not in before or panel_values(old, panel) != panel_values(new, panel)
-    )
+    match panel.kind:
+        case "template":
+            return ()
+        case "effect":
+            return tuple(item for item in state.named if item[0] == panel.covariate)
+        case "before":
+            return state.reference.values if state.reference else ()
+        case _:
+            return state.named
 
 
 def label(name: str) -> str:
@@ -166,7 +259,14 @@ def label(name: str) -> str:
 
 def panel_title(panel: Panel) -> str:
     """What stands above a sub-plot."""
-    titles = {"template": "Template", "shape": "Full shape"}
+    titles = {
+        "template": "Template",
+        "shape": "Full shape",
+        "scan": "Scan",
+        "certainty": "Uncertainty",
+        "before": "Before",
+        "change": "Change",
+    }
     return titles.get(panel.kind) or f"{label(panel.covariate)} only"
 
 
@@ -183,21 +283,25 @@ def is_seen(population: Population, values: Mapping[str, float]) -> bool:
     measured = [covariate for covariate in population.covariates if covariate.kind == "continuous"]
     if not measured or np.count_nonzero(~population.held_out) <= NEIGHBOURS:
         return True
-    tree, usual = _neighbourhood(population)
-    here = [float(c.normalise(values.get(c.name, c.centre))) for c in measured]
-    return bool(tree.query(here, k=[NEIGHBOURS])[0][0] <= usual)
+    rows, usual = _neighbourhood(population)
+    here = np.array([float(c.normalise(values.get(c.name, c.centre))) for c in measured])
+    return _loneliness(rows, here, NEIGHBOURS) <= usual
 
 
 @lru_cache(maxsize=4)
-def _neighbourhood(population: Population) -> tuple[cKDTree, float]:
-    """The training rows for look-up, and how far their neighbours are at the edge of the data."""
-    from scipy.spatial import cKDTree  # here, because it would slow down --help
-
+def _neighbourhood(population: Population) -> tuple[NDArray[np.float64], float]:
+    """The training rows, and how far their neighbours are at the edge of the data."""
     columns = [i for i, covariate in enumerate(population.covariates) if covariate.kind == "continuous"]
     rows = population.normalised()[~population.held_out][:, columns]
-    tree = cKDTree(rows)
-    distances = tree.query(rows, k=[NEIGHBOURS + 1])[0]  # one more: every row is its own nearest
-    return tree, max(float(np.quantile(distances, EDGE_OF_DATA)), LEAST_SPREAD)
+    # One more: every row is its own nearest. By hand, because SciPy would delay the first picture.
+    distances = [_loneliness(rows, row, NEIGHBOURS + 1) for row in rows]
+    return rows, max(float(np.quantile(distances, EDGE_OF_DATA)), LEAST_SPREAD)
+
+
+def _loneliness(rows: NDArray[np.float64], here: NDArray[np.float64], neighbours: int) -> float:
+    """Distance of ``here [N]`` to its so manieth nearest of ``rows [n, N]``."""
+    squared = np.square(rows - here).sum(axis=1)
+    return float(np.sqrt(np.partition(squared, neighbours - 1)[neighbours - 1]))
 
 
 @dataclass(frozen=True)

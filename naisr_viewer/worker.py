@@ -13,7 +13,7 @@ from collections.abc import Callable
 from threading import Condition, Thread
 from typing import Any, Protocol
 
-from PySide6.QtCore import QObject, Signal, Slot
+from PySide6.QtCore import QObject, QTimer, Signal, Slot
 
 REPORT_INTERVAL_S = 0.05
 """Progress reports closer together than this are left out."""
@@ -51,6 +51,7 @@ class Worker(QObject):
         self._generation = 0
         self._oldest_valid = 0
         self._started = 0
+        self._running = False
         self._waiting: tuple[int, Job] | None = None
         self._closed = False
         self._changed = Condition()
@@ -71,10 +72,13 @@ class Worker(QObject):
             self._run_waiting()
 
     def cancel(self) -> None:
-        """Make everything submitted so far stale."""
+        """Make everything submitted so far stale; :attr:`idle` follows, even if nothing had begun."""
         with self._changed:
             self._oldest_valid = self._generation + 1
-            self._waiting = None
+            dropped, self._waiting = self._waiting, None
+            if dropped is not None and not self._running:
+                self._started = dropped[0]
+                QTimer.singleShot(0, self, lambda: self._relay(dropped[0], "idle", None))
 
     def close(self) -> None:
         """Cancel and wait for the thread to end; nothing is reported any more."""
@@ -101,7 +105,7 @@ class Worker(QObject):
             if self._waiting is None:
                 return
             (generation, job), self._waiting = self._waiting, None
-            self._started = generation
+            self._started, self._running = generation, True
         try:
             job(
                 lambda result: self._reported.emit(generation, "delivered", result),
@@ -110,6 +114,7 @@ class Worker(QObject):
             )
         except Exception as error:  # whatever it is, the user is told in the window
             self._reported.emit(generation, "failed", error)
+        self._running = False
         self._reported.emit(generation, "idle", None)
 
     def _thinned(self, generation: int) -> Callable[[float], None]:

@@ -7,8 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, QSignalBlocker, QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import (
+    QCheckBox,
     QDoubleSpinBox,
     QFrame,
     QGridLayout,
@@ -34,10 +35,22 @@ HANDLE_PX = 16
 """Diameter of the slider handle; the histogram leaves half of it free on both sides."""
 
 BINS = 28
+
+MARK_PX = 10
+"""Width and height of the triangle at the patient's value."""
+
+BAND_PX = 3.0
+"""Height of the band beneath the bars that tells the patient's interval."""
+
 SETTLE_MS = 400
 """Keys and wheel count as one movement until they pause this long."""
 
 PANEL_WIDTH = 320
+
+FOLLOW_HINT = (
+    "Moving one covariate takes the other continuous ones along the population's growth path,\n"
+    "keeping this person's own distance from it."
+)
 
 
 def slider_position(covariate: Covariate, value: float) -> int:
@@ -57,6 +70,28 @@ def decimals(covariate: Covariate) -> int:
     """Digits after the point that tell about a thousand steps of the range apart."""
     low, high = covariate.range
     return max(0, min(6, 2 - math.floor(math.log10(max(high - low, 1e-6)))))
+
+
+def reading(covariate: Covariate, value: float) -> str:
+    """The value with its unit and as many digits as its number box has: ``84 months``, ``M``."""
+    if covariate.kind == "binary":
+        return covariate.format(round(value, 2))
+    return f"{value:.{decimals(covariate)}f} {covariate.unit}".rstrip()
+
+
+def patient_reading(covariate: Covariate, value: float, interval: tuple[float, float] | None) -> str:
+    """The patient's value in words: ``patient 21.3 kg, 95 %: 18.2 to 24.9``."""
+    text = f"patient {reading(covariate, value)}"
+    if interval is None:
+        return text
+    digits = 2 if covariate.kind == "binary" else decimals(covariate)
+    low, high = (f"{end:.{digits}f}".replace("-", "−") for end in interval)
+    return f"{text}, 95 %: {low} to {high}"
+
+
+def mean_reading(covariate: Covariate) -> str:
+    """The population mean in words; halfway between the levels of a binary covariate."""
+    return "in the middle" if covariate.kind == "binary" else reading(covariate, covariate.centre)
 
 
 def bin_counts(covariate: Covariate, observed: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -116,39 +151,46 @@ class JumpSlider(QSlider):
 
 
 class Histogram(QWidget):
-    """Where data exist: bars over the slider's range and a tick at the population mean."""
+    """Where data exist: bars over the slider's range, a tick at the population mean, the patient's mark."""
 
     def __init__(self, covariate: Covariate, observed: NDArray[np.float64], parent: QWidget) -> None:
         super().__init__(parent)
+        self._covariate = covariate
         self._counts = bin_counts(covariate, observed)
-        low, high = covariate.range
-        self._mean = (covariate.centre - low) / (high - low) if high > low else 0.5
-        self._bar = self._tick = QColor()
+        self._patient: float | None = None
+        self._interval: tuple[float, float] | None = None
+        self._bar = self._tick = self._mark = self._rim = QColor()
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setToolTip(
-            f"{len(observed)} shapes behind the atlas between {low:g} and {high:g} {covariate.unit}".strip()
-            + f"; the tick is their mean, {covariate.format(covariate.centre)}"
-            if covariate.kind == "continuous"
-            else " · ".join(
-                f"{int(n)} {name}" for n, name in zip(self._counts, covariate.levels, strict=True)
-            )
-        )
+        self._explain()
+
+    def show_patient(self, value: float | None, interval: tuple[float, float] | None = None) -> None:
+        """Mark a patient's value (real units).
+
+        Args:
+            value: None for nobody's.
+            interval: low and high end (95 %) where the value was inferred; None where it was known.
+        """
+        if (value, interval) != (self._patient, self._interval):
+            self._patient, self._interval = value, interval
+            self._explain()
+            self.update()
 
     def sizeHint(self) -> QSize:
         """As wide as there is room, low."""
         return QSize(120, 26)
 
     def set_colours(self, theme: Theme, colour: str) -> None:
-        """Bars muted, the mean in the covariate's colour."""
+        """Bars muted, the mean in the covariate's colour, the patient in that of the words."""
         self._bar, self._tick = QColor(theme.muted), QColor(colour)
+        self._mark, self._rim = QColor(theme.text), QColor(theme.window)
         self._bar.setAlpha(110)
         self.update()
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        """Bars first, the mean over them."""
+        """Bars first, the mean over them, then the patient."""
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        left, width, height = HANDLE_PX / 2, self.width() - HANDLE_PX, self.height() - 3.0
+        left, width, height = HANDLE_PX / 2, self.width() - HANDLE_PX, self.height() - BAND_PX
         step = width / len(self._counts)
         tallest = max(self._counts.max(), 1.0)
         painter.setPen(Qt.PenStyle.NoPen)
@@ -156,10 +198,46 @@ class Histogram(QWidget):
         for index, count in enumerate(self._counts):
             bar = height * count / tallest
             painter.drawRect(QRectF(left + index * step, height - bar, max(step - 1.0, 1.0), bar))
-        x = left + self._mean * width
+        x = self._x(self._covariate.centre)
         painter.setPen(QPen(self._tick, 2.0))
         painter.drawLine(QPointF(x, 0.0), QPointF(x, self.height()))
+        if self._patient is not None:
+            self._paint_patient(painter, self._x(self._patient))
         painter.end()
+
+    def _paint_patient(self, painter: QPainter, x: float) -> None:
+        """A triangle that points at the value, and a band beneath the bars."""
+        base = self.height() - BAND_PX
+        corners = [(x, base - MARK_PX), (x + MARK_PX / 2, base), (x - MARK_PX / 2, base)]
+        painter.setBrush(self._mark)
+        painter.setPen(QPen(self._rim, 1.0))
+        painter.drawPolygon(QPolygonF([QPointF(*corner) for corner in corners]))
+        if self._interval is not None:
+            low, high = map(self._x, self._interval)
+            painter.fillRect(QRectF(low, base, max(high - low, 1.0), BAND_PX), self._mark)
+
+    def _x(self, value: float) -> float:
+        """The horizontal pixel coordinate under the slider's handle at a real value."""
+        low, high = self._covariate.range
+        share = (value - low) / (high - low) if high > low else 0.5
+        return HANDLE_PX / 2 + min(max(share, 0.0), 1.0) * (self.width() - HANDLE_PX)
+
+    def _explain(self) -> None:
+        """Say on hover what is drawn."""
+        covariate = self._covariate
+        marks = [f"Tick: population mean {mean_reading(covariate)}"]
+        if self._patient is not None:
+            marks.append(f"Triangle: {patient_reading(covariate, self._patient, self._interval)}")
+        self.setToolTip("\n".join([f"Bars: {self._bars_reading()}", *marks]))
+
+    def _bars_reading(self) -> str:
+        """Whom the bars count, in words."""
+        if self._covariate.kind == "binary":
+            levels = zip(self._counts, self._covariate.levels, strict=True)
+            return " · ".join(f"{int(count)} {name}" for count, name in levels)
+        low, high = self._covariate.range
+        where = f"between {low:g} and {high:g} {self._covariate.unit}".rstrip()
+        return f"{int(self._counts.sum())} shapes behind the atlas {where}"
 
 
 class CovariateRow(QWidget):
@@ -179,13 +257,14 @@ class CovariateRow(QWidget):
         self.slider.setAccessibleName(label(covariate.name))
         self.histogram = Histogram(covariate, observed, self)
         self.reset = _reset_button(covariate, self)
-        self.spin = _spin_box(covariate, self) if covariate.kind == "continuous" else None
+        self.spin = ValueBox(covariate, self) if covariate.kind == "continuous" else None
         levels = covariate.levels if covariate.kind == "binary" else ()
         self.buttons = [
             LevelButton(name, value, self) for name, value in zip(levels, (-1.0, 1.0), strict=False)
         ]
         self.reading = QLabel(self)
         self.reading.setObjectName("muted")
+        self.set_home(covariate.centre, is_patient=False)
         self._pending: float | None = None
         self._settle = QTimer(self, singleShot=True, interval=SETTLE_MS)
         self._compose()
@@ -197,6 +276,20 @@ class CovariateRow(QWidget):
         low, high = map(self.covariate.format, self.covariate.range)
         return f"{low.removesuffix(self.covariate.unit).strip()} to {high}"
 
+    def set_home(self, value: float, is_patient: bool, interval: tuple[float, float] | None = None) -> None:
+        """Say where the row is reset to.
+
+        Args:
+            value: real value.
+            is_patient: whether it is a patient's, and is marked; else the population mean.
+            interval: of a patient's value that was inferred: low and high end (95 %).
+        """
+        self._home = value
+        self.histogram.show_patient(value if is_patient else None, interval)
+        whose = f"patient ({reading(self.covariate, value)})"
+        mean = f"population mean ({mean_reading(self.covariate)})"
+        self.reset.setToolTip(f"Back to the {whose if is_patient else mean}")
+
     def set_value(self, value: float) -> None:
         """Show a real value without telling anybody."""
         with QSignalBlocker(self.slider):
@@ -206,8 +299,14 @@ class CovariateRow(QWidget):
                 self.spin.setValue(value)
         for button in self.buttons:
             button.setChecked(button.level == value)
-        self.reset.setEnabled(value != self.covariate.centre)
+        self.reset.setEnabled(value != self._home)
         self.reading.setText(self.covariate.format(round(value, 2)))
+
+    def forget_move(self) -> None:
+        """Say no more of a movement that has not come to rest."""
+        self._settle.stop()
+        self._pending = None
+        self.slider.setSliderDown(False)
 
     def set_colours(self, theme: Theme) -> None:
         """Follow the theme."""
@@ -281,6 +380,22 @@ class CovariateRow(QWidget):
         self.value_settled.emit(self.covariate.name, button.level)
 
 
+class ValueBox(QDoubleSpinBox):
+    """A real value of a continuous covariate, inside its observed range."""
+
+    def __init__(self, covariate: Covariate, parent: QWidget) -> None:
+        super().__init__(parent)
+        low, high = covariate.range
+        self.setDecimals(decimals(covariate))
+        self.setRange(low, high)
+        self.setSingleStep(10.0 ** (1 - decimals(covariate)))
+        self.setKeyboardTracking(False)
+        self.setAlignment(Qt.AlignmentFlag.AlignRight)
+        self.setFixedWidth(76)
+        self.setToolTip(f"{low:g} to {high:g} {covariate.unit}".strip())
+        self.setAccessibleName(f"{label(covariate.name)} in {covariate.unit}".removesuffix(" in "))
+
+
 class LevelButton(QPushButton):
     """One level of a binary covariate."""
 
@@ -296,24 +411,8 @@ def _reset_button(covariate: Covariate, parent: QWidget) -> QToolButton:
     button = QToolButton(parent)
     button.setText("↺")
     button.setAutoRaise(True)
-    where = "the middle" if covariate.kind == "binary" else covariate.format(covariate.centre)
-    button.setToolTip(f"Back to the population mean ({where})")
     button.setAccessibleName(f"Reset {label(covariate.name)}")
     return button
-
-
-def _spin_box(covariate: Covariate, parent: QWidget) -> QDoubleSpinBox:
-    low, high = covariate.range
-    spin = QDoubleSpinBox(parent)
-    spin.setDecimals(decimals(covariate))
-    spin.setRange(low, high)
-    spin.setSingleStep(10.0 ** (1 - decimals(covariate)))
-    spin.setKeyboardTracking(False)
-    spin.setAlignment(Qt.AlignmentFlag.AlignRight)
-    spin.setFixedWidth(76)
-    spin.setToolTip(f"{low:g} to {high:g} {covariate.unit}".strip())
-    spin.setAccessibleName(f"{label(covariate.name)} in {covariate.unit}".removesuffix(" in "))
-    return spin
 
 
 class CovariatePanel(QFrame):
@@ -323,6 +422,7 @@ class CovariatePanel(QFrame):
     value_settled = Signal(str, float)  # name, real value: it came to rest
     reset_requested = Signal(str)  # name: the row's reset button was pressed
     reset_all_requested = Signal()  # "Reset all" was pressed
+    follow_toggled = Signal(bool)  # whether the others shall follow the covariate that is moved
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -334,8 +434,10 @@ class CovariatePanel(QFrame):
         self.subtitle = QLabel(self)
         self.subtitle.setObjectName("muted")
         self.subtitle.setWordWrap(True)
-        self.reset_all = QPushButton("Reset all", self)
-        self.reset_all.setToolTip("Every covariate back to the population mean (Ctrl+R)")
+        self.follow = QCheckBox("Others follow as in the population", self)
+        self.follow.setToolTip(FOLLOW_HINT)
+        self.follow.toggled.connect(self.follow_toggled)
+        self.reset_all = QPushButton(self)
         self.reset_all.clicked.connect(self.reset_all_requested)
         self._rows_area = QVBoxLayout()
         self._rows_area.setSpacing(22)
@@ -357,13 +459,27 @@ class CovariatePanel(QFrame):
             self._rows_area.addWidget(row)
         self.title.setText(f"{label(atlas.name)} atlas")
         self.subtitle.setText(_origin(atlas))
+        self.follow.setVisible(sum(covariate.kind == "continuous" for covariate in atlas.covariates) > 1)
         self.reset_all.setVisible(True)
         self.set_theme(theme)
 
     def show_values(self, state: ExplorerState) -> None:
-        """Put every row at its value."""
-        for name, value in state.named:
+        """Put every row at its value, and say where home is: the patient's values or the population mean."""
+        fit = state.fit
+        intervals = {name: (low, high) for name, low, high in fit.intervals} if fit is not None else {}
+        for (name, value), home in zip(state.named, state.home, strict=True):
+            self.rows[name].set_home(home, fit is not None, intervals.get(name))
             self.rows[name].set_value(value)
+        with QSignalBlocker(self.follow):
+            self.follow.setChecked(state.follow)
+        self.reset_all.setText("Reset all" if fit is None else "Back to the patient")
+        whose = "population mean" if fit is None else "patient's values"
+        self.reset_all.setToolTip(f"Every covariate back to the {whose} (Ctrl+R)")
+
+    def forget_moves(self) -> None:
+        """Say no more of movements that have not come to rest."""
+        for row in self.rows.values():
+            row.forget_move()
 
     def set_theme(self, theme: Theme) -> None:
         """Follow the theme."""
@@ -380,8 +496,11 @@ class CovariatePanel(QFrame):
         column.addSpacing(18)
         column.addLayout(self._rows_area)
         column.addSpacing(20)
+        column.addWidget(self.follow)
+        column.addSpacing(10)
         column.addWidget(self.reset_all)
         column.addStretch(1)
+        self.follow.setVisible(False)
         self.reset_all.setVisible(False)
         area = QScrollArea(self)
         area.setWidget(inside)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QComboBox,
     QDialog,
@@ -19,10 +20,14 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from naisr_viewer.patients import Labels
 from naisr_viewer.requests import EXACT_RESOLUTION, FORMATS, ExportChoice
 from naisr_viewer.state import AtlasCard, ExplorerState, Panel, all_panels, panel_title
 
 ATLAS_FILTER = "Atlas (*.safetensors);;All files (*)"
+SCAN_ENDINGS = ("stl", "ply", "obj", "vtk", "vtp", "glb", "nii", "nii.gz", "nrrd", "csv", "txt", "xyz")
+"""Meshes, label volumes and text files of points that can be opened as a scan."""
+
 RESOLUTIONS = (64, EXACT_RESOLUTION, 192, 256)
 
 
@@ -30,6 +35,29 @@ def ask_open_path(parent: QWidget, filters: str) -> Path | None:
     """The atlas to open, or None."""
     name, _ = QFileDialog.getOpenFileName(parent, "Open an atlas", "", filters)
     return Path(name) if name else None
+
+
+def ask_scan_path(parent: QWidget) -> Path | None:
+    """The scan to open, or None."""
+    endings = " ".join(f"*.{ending}" for ending in SCAN_ENDINGS)
+    filters = f"Meshes, label volumes and points ({endings});;All files (*)"
+    name, _ = QFileDialog.getOpenFileName(parent, "Open a scan", "", filters)
+    return Path(name) if name else None
+
+
+def ask_landmarks_path(parent: QWidget) -> Path | None:
+    """The landmarks of a scan, a CSV name,x,y,z in its own coordinates, or None."""
+    filters = "Landmarks: name,x,y,z (*.csv);;All files (*)"
+    name, _ = QFileDialog.getOpenFileName(parent, "Landmarks of the scan", "", filters)
+    return Path(name) if name else None
+
+
+def ask_label(parent: QWidget, labels: Labels) -> int | None:
+    """Which label of a volume is the shape, or None when the question was cancelled."""
+    dialog = LabelDialog(labels, parent)
+    accepted = dialog.exec() == QDialog.DialogCode.Accepted
+    dialog.deleteLater()
+    return int(dialog.choice.currentData()) if accepted else None
 
 
 def ask_image_path(parent: QWidget, state: ExplorerState) -> Path | None:
@@ -51,6 +79,34 @@ def about(parent: QWidget, version: str) -> None:
         "Representation</i>, ICLR 2024.</p>"
         "<p>For research. Not a medical device.</p>",
     )
+
+
+class LabelDialog(QDialog):
+    """Which label of a volume is the shape."""
+
+    def __init__(self, labels: Labels, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Choose a label")
+        self.setMinimumWidth(380)
+        question = QLabel(
+            f"{labels.reading.path.name} holds {len(labels.titles)} labels. Which is the shape?"
+        )
+        question.setTextFormat(Qt.TextFormat.PlainText)
+        question.setWordWrap(True)
+        self.choice = QComboBox(self)
+        self.choice.setAccessibleName("Label")
+        for number, title in labels.titles:
+            self.choice.addItem(title, number)
+        buttons = QDialogButtonBox(self)
+        buttons.addButton("Cancel", QDialogButtonBox.ButtonRole.RejectRole)
+        buttons.addButton("Open", QDialogButtonBox.ButtonRole.AcceptRole).setDefault(True)
+        buttons.accepted.connect(self.accept)
+        buttons.rejected.connect(self.reject)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(18, 18, 18, 14)
+        column.setSpacing(14)
+        for widget in (question, self.choice, buttons):
+            column.addWidget(widget)
 
 
 class ExportDialog(QDialog):

@@ -1,4 +1,4 @@
-"""The window: menus, the covariates on the left, the shapes in the centre, what is going on below."""
+"""The window: covariates on the left, shapes in the centre, patients on the right, what goes on below."""
 
 from __future__ import annotations
 
@@ -34,15 +34,26 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from naisr_viewer.state import ExplorerState, Layout, visible_panels
+from naisr_viewer.patients import Labels
+from naisr_viewer.state import OF_A_PATIENT, ExplorerState, Layout, visible_panels
 from naisr_viewer.views.covariate_panel import CovariatePanel
-from naisr_viewer.views.dialogs import ATLAS_FILTER, ExportDialog, about, ask_image_path, ask_open_path
+from naisr_viewer.views.dialogs import (
+    ATLAS_FILTER,
+    ExportDialog,
+    about,
+    ask_image_path,
+    ask_label,
+    ask_open_path,
+    ask_scan_path,
+)
+from naisr_viewer.views.patient_panel import PatientPanel
 from naisr_viewer.views.scale_bar import ScaleBar
 from naisr_viewer.views.shape_view import DIRECTIONS, ShapeView
 from naisr_viewer.views.theme import ThemeChoice, palette, resolved, style_sheet
 
 TITLE = "NAISR Atlas Explorer"
 FIRST_SIZE = QSize(1280, 800)
+ATLAS_ENDING = ".safetensors"
 
 Choice = TypeVar("Choice")
 
@@ -50,7 +61,8 @@ Choice = TypeVar("Choice")
 class MainWindow(QMainWindow):
     """Shows a state; every user act leaves as a signal."""
 
-    open_requested = Signal(Path)  # a file was chosen, dropped or picked from the recent ones
+    open_requested = Signal(Path)  # an atlas was chosen, dropped or picked from the recent ones
+    scan_requested = Signal(Path)  # a patient's file was chosen or dropped
     export_requested = Signal(object)  # an ExportChoice from the dialog
     screenshot_requested = Signal(Path)  # where the picture shall go
     undo_requested = Signal()  # Edit > Undo
@@ -69,8 +81,10 @@ class MainWindow(QMainWindow):
         self.setAcceptDrops(True)
         self._theme_choice = ThemeChoice.SYSTEM
         self._has_appeared = False
+        self._is_editable, self._can_undo, self._can_redo = True, False, False
         self.covariates = CovariatePanel(self)
         self.shapes = ShapeView(self)
+        self.patients = PatientPanel(self)
         self._state = ExplorerState()
         self._make_body()
         self._make_status()
@@ -93,15 +107,26 @@ class MainWindow(QMainWindow):
         self.scale.setVisible(state.atlas is not None)
         self.covariates.setVisible(state.atlas is not None)
         self.covariates.show_values(state)
+        self.patients.show_state(state)
+        if len(state.patients) > len(old.patients):
+            self._patients_action.setChecked(True)
+        self.patients.setVisible(self._patients_action.isChecked() and state.atlas is not None)
         self.shapes.show_panels(visible_panels(state))
+        self._show_ghost(state)
         self._layouts[state.layout].setChecked(True)
-        for action in self._needs_atlas:
-            action.setEnabled(state.atlas is not None)
+        self._enable()
+
+    def _show_ghost(self, state: ExplorerState) -> None:
+        scan = state.shown.scan if state.shown and state.has_ghost else None
+        if scan is None:
+            self.shapes.show_ghost(None)
+        else:
+            self.shapes.show_ghost(scan.points_mm, scan.faces)
 
     def show_history(self, can_undo: bool, can_redo: bool) -> None:
         """Enable what can be undone and redone."""
-        self._undo.setEnabled(can_undo)
-        self._redo.setEnabled(can_redo)
+        self._can_undo, self._can_redo = can_undo, can_redo
+        self._enable()
 
     def show_recent(self, paths: Sequence[Path]) -> None:
         """Fill File > Open recent."""
@@ -133,7 +158,8 @@ class MainWindow(QMainWindow):
             widget.setVisible(not name)
 
     def show_progress(self, fraction: float | None) -> None:
-        """The bar and its cancel button at the bottom right; None hides them."""
+        """The bar and its cancel button at the bottom right; None hides them, at 0 it only says: busy."""
+        self.progress.setMaximum(1000 if fraction else 0)
         self.progress.setVisible(fraction is not None)
         self.cancel.setVisible(fraction is not None)
         self.progress.setValue(round(1000 * (fraction or 0.0)))
@@ -148,8 +174,27 @@ class MainWindow(QMainWindow):
         about(self, version)
 
     def set_editable(self, editable: bool) -> None:
-        """Whether covariates can be changed just now."""
+        """Whether covariates and patients can be changed just now; what would end the work rests, too."""
         self.covariates.setEnabled(editable)
+        self.patients.set_editable(editable)
+        self._is_editable = editable
+        self._enable()
+
+    def _enable(self) -> None:
+        """Enable the actions that make sense."""
+        is_open, is_editable = self._state.atlas is not None, self._is_editable
+        for action in self._needs_atlas:
+            action.setEnabled(is_open)
+        for action in self._needs_rest:
+            action.setEnabled(is_open and is_editable)
+        for layout in OF_A_PATIENT:
+            self._layouts[layout].setEnabled(self._state.fit is not None)
+        self._undo.setEnabled(self._can_undo and is_editable)
+        self._redo.setEnabled(self._can_redo and is_editable)
+
+    def ask_label(self, labels: Labels) -> int | None:
+        """Which label of a volume; None when nobody chose."""
+        return ask_label(self, labels)
 
     def grab_image(self) -> QImage:
         """The whole window as a picture."""
@@ -174,11 +219,13 @@ class MainWindow(QMainWindow):
             event.acceptProposedAction()
 
     def dropEvent(self, event: QDropEvent) -> None:
-        """Open the first file that was dropped."""
+        """Open what was dropped: an atlas by its ending, all others as scans."""
         files = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
         if files:
             event.acceptProposedAction()
-            self.open_requested.emit(files[0])
+        for file in files:
+            is_atlas = file.suffix.lower() == ATLAS_ENDING
+            (self.open_requested if is_atlas else self.scan_requested).emit(file)
 
     def _make_body(self) -> None:
         self._error_bar = QFrame(self)
@@ -206,6 +253,8 @@ class MainWindow(QMainWindow):
         row.setSpacing(0)
         row.addWidget(self.covariates)
         row.addLayout(right, 1)
+        row.addWidget(self.patients)
+        self.patients.open_requested.connect(self._open_scan)
         self.setCentralWidget(body)
 
     def _empty_page(self) -> QWidget:
@@ -259,7 +308,10 @@ class MainWindow(QMainWindow):
         return action
 
     def _make_actions(self) -> None:
-        self._open_action = self._action("Open…", self._open, "Ctrl+O", "Open another atlas")
+        self._open_action = self._action("Open atlas…", self._open, "Ctrl+O", "Open another atlas")
+        self._scan_action = self._action(
+            "Open scan…", self._open_scan, "Ctrl+Shift+O", "Open a patient's shape to fit the atlas to it"
+        )
         self._export = self._action("Export…", self._ask_export, "Ctrl+E", "Write surfaces to files")
         self._screenshot = self._action(
             "Screenshot…", self._ask_screenshot, "Ctrl+S", "Save a picture of the window"
@@ -272,18 +324,25 @@ class MainWindow(QMainWindow):
         self._reset = self._action("Reset all covariates", self.covariates.reset_all_requested.emit, "Ctrl+R")
         self._camera = self._action("Reset camera", self.shapes.reset_camera, "Ctrl+0", "Frame the shapes")
         self._layouts = self._choices(
-            {Layout.SIDE_BY_SIDE: ("Side by side", "Ctrl+1"), Layout.FULL_SHAPE: ("Full shape", "Ctrl+2")},
+            {
+                Layout.SIDE_BY_SIDE: ("Side by side", "Ctrl+1"),
+                Layout.FULL_SHAPE: ("Full shape", "Ctrl+2"),
+                Layout.FIT: ("Fit", "Ctrl+3"),
+                Layout.CHANGE: ("Before and after", "Ctrl+4"),
+            },
             self.layout_requested.emit,
         )
+        self._patients_action = self._action("Patients", self._toggle_patients, "Ctrl+P", "Show the patients")
+        self._patients_action.setCheckable(True)
         themes = {choice: (f"{choice.value.capitalize()} theme", "") for choice in ThemeChoice}
         self._themes = self._choices(themes, self.theme_requested.emit)
         self._needs_atlas = [
-            self._export,
             self._screenshot,
-            self._reset,
             self._camera,
+            self._patients_action,
             *self._layouts.values(),
         ]
+        self._needs_rest = [self._scan_action, self._export, self._reset]
 
     def _choices(
         self, options: Mapping[Choice, tuple[str, str]], choose: Callable[[Choice], object]
@@ -299,7 +358,7 @@ class MainWindow(QMainWindow):
     def _make_menus(self) -> None:
         bar = self.menuBar()
         file = bar.addMenu("&File")
-        file.addAction(self._open_action)
+        file.addActions([self._open_action, self._scan_action])
         self._recent = QMenu("Open recent", self)
         file.addMenu(self._recent)
         file.addSeparator()
@@ -309,6 +368,7 @@ class MainWindow(QMainWindow):
         bar.addMenu("&Edit").addActions([self._undo, self._redo, self._reset])
         view = bar.addMenu("&View")
         view.addActions(list(self._layouts.values()))
+        view.addAction(self._patients_action)
         view.addSeparator()
         view.addAction(self._camera)
         for number, direction in enumerate(DIRECTIONS, start=1):
@@ -325,7 +385,7 @@ class MainWindow(QMainWindow):
         bar.setMovable(False)
         bar.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextOnly)
         bar.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
-        bar.addActions([self._open_action, self._export, self._screenshot])
+        bar.addActions([self._open_action, self._scan_action, self._export, self._screenshot])
         bar.addSeparator()
         bar.addActions(list(self._layouts.values()))
         bar.addSeparator()
@@ -336,6 +396,14 @@ class MainWindow(QMainWindow):
         path = ask_open_path(self, ATLAS_FILTER)
         if path is not None:
             self.open_requested.emit(path)
+
+    def _open_scan(self) -> None:
+        path = ask_scan_path(self)
+        if path is not None:
+            self.scan_requested.emit(path)
+
+    def _toggle_patients(self) -> None:
+        self.show_state(self._state)
 
     def _ask_export(self) -> None:
         assert self._state.atlas is not None

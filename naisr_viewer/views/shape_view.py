@@ -10,14 +10,24 @@ from importlib import import_module
 from threading import Thread
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import QRect, Qt, Signal
 from PySide6.QtGui import QImage, QResizeEvent, QSurfaceFormat
 from PySide6.QtOpenGLWidgets import QOpenGLWidget
 from PySide6.QtWidgets import QFrame, QLabel, QVBoxLayout, QWidget
 
 from naisr_viewer.requests import SurfaceResult
-from naisr_viewer.state import AtlasCard, Panel, all_panels, panel_title
-from naisr_viewer.views.theme import LIGHT, Theme, panel_colour
+from naisr_viewer.state import (
+    FULL_SHAPE,
+    OF_A_PATIENT,
+    AtlasCard,
+    Panel,
+    all_panels,
+    panel_title,
+)
+from naisr_viewer.views.colour_bar import HEIGHT_PX, WIDTH_PX, ColourBar
+from naisr_viewer.views.theme import LIGHT, Theme, ghost_colour, panel_colour
 
 if TYPE_CHECKING:
     from naisr_viewer.views.canvas import Canvas, Viewport
@@ -29,6 +39,16 @@ TITLE_PX = 36
 CAPTION_PX = 52
 """Strips above and beneath each shape, kept free for words."""
 
+OF_PATIENTS = tuple(
+    dict.fromkeys(panel for shown in OF_A_PATIENT.values() for panel in shown if panel != FULL_SHAPE)
+)
+"""Sub-plots besides those that every atlas has."""
+
+SIGNED = {"scan": True, "certainty": False, "change": True}
+"""Kinds of panels that have a colour bar, and whether it has two sides."""
+
+NO_FACES = np.zeros((0, 3), np.int64)
+
 DRAWING = "naisr_viewer.views.canvas"
 """The module that draws; loaded behind the window, because VTK takes a while."""
 
@@ -39,6 +59,19 @@ HINTS = {
         "Displacements add up at a point; the surfaces shown here do not add up to the full shape."
     ),
     "shape": "The template moved by all covariates together.",
+    "scan": (
+        "The patient's scan, coloured by its distance to the full shape in mm:\n"
+        "orange where the scan lies outside the shape (+), blue where it lies inside (−)."
+    ),
+    "certainty": (
+        "The full shape, coloured by how far its surface may lie off in mm:\n"
+        "half of the 95 % interval of its place, inwards or outwards."
+    ),
+    "before": "The shape that changes are counted from.",
+    "change": (
+        "The full shape, coloured by how far it has moved since “before” in mm:\n"
+        "orange where it moved outwards (+), blue where it moved inwards (−)."
+    ),
 }
 
 DIRECTIONS: dict[str, tuple[tuple[float, float, float], tuple[float, float, float]]] = {
@@ -80,9 +113,14 @@ def cells(count: int, columns: int) -> list[tuple[float, float, float, float]]:
     return [*places[:-1], (left, top, 1 - left, height)]
 
 
-def drawn_height(area: QRect) -> int:
-    """Pixels left for the shape between the title and the caption of a sub-plot."""
-    return max(area.height() - TITLE_PX - CAPTION_PX, 1)
+def strip_height(panels: Sequence[Panel]) -> int:
+    """Pixels beneath every shape for colour bars; none where no panel has one."""
+    return HEIGHT_PX if any(panel.kind in SIGNED for panel in panels) else 0
+
+
+def drawn_height(area: QRect, strip: int) -> int:
+    """Pixels left for the shape between the title and what stands beneath it."""
+    return max(area.height() - TITLE_PX - CAPTION_PX - strip, 1)
 
 
 def separators(areas: Sequence[QRect]) -> set[tuple[int, int, int, int]]:
@@ -98,21 +136,28 @@ class Cell:
     Attributes:
         title: the label above.
         volume: the label beneath.
+        bar: what its colours stand for; None where it has none.
         result: the surface, or None as long as there is none.
     """
 
     title: QLabel
     volume: QLabel
+    bar: ColourBar | None
     result: SurfaceResult | None = None
 
     @property
     def has_surface(self) -> bool:
         """Whether there is anything to see."""
-        return self.result is not None and len(self.result.faces) > 0
+        return self.result is not None and len(self.result.points_mm) > 0
+
+    @property
+    def widgets(self) -> list[QWidget]:
+        """All that stands around the shape."""
+        return [self.title, self.volume, *([] if self.bar is None else [self.bar])]
 
 
 class ShapeView(QWidget):
-    """Template, effects and full shape, seen through one camera."""
+    """Template, effects, full shape and the sub-plots of patients, seen through one camera."""
 
     scale_changed = Signal(float)  # pixels per millimetre, after zooming or resizing
     drawn = Signal(int)  # the picture is on its way to the screen; how many sub-plots were drawn anew
@@ -136,11 +181,13 @@ class ShapeView(QWidget):
         self._cells: dict[Panel, Cell] = {}
         self._visible: tuple[Panel, ...] = ()
         self._separators: list[QFrame] = []
+        self._ghost: tuple[NDArray[np.float32] | None, NDArray[np.int64]] = (None, NO_FACES)
         self._direction = OBLIQUE
         self._framed = False
         self._moving = self._held = False
         self._seen_mm = (1.0, 1.5)
         self._fit_scale = 1.0
+        self._strip = 0
         self._drawn_height = 1
         self._pixels_per_mm = 0.0
         self._area = QVBoxLayout(self)
@@ -163,11 +210,12 @@ class ShapeView(QWidget):
             self._loading.start()
 
     def show_atlas(self, atlas: AtlasCard, theme: Theme) -> None:
-        """Make one sub-plot per panel of ``atlas``, still without surfaces."""
+        """Make one sub-plot per panel of ``atlas`` and of its patients, still without surfaces."""
         self.prepare()
         self._remove_cells()
         self._atlas = atlas
-        self._cells = {panel: self._make_cell(panel, atlas) for panel in all_panels(atlas)}
+        self._cells = {panel: self._make_cell(panel, atlas) for panel in (*all_panels(atlas), *OF_PATIENTS)}
+        self._ghost = (None, NO_FACES)
         self._direction = OBLIQUE
         self._theme = theme
         self._open_canvas()
@@ -180,11 +228,36 @@ class ShapeView(QWidget):
 
     def show_surface(self, result: SurfaceResult) -> None:
         """Replace one surface in place; all that are replaced before Qt paints again share one painting."""
-        panel = result.request.panel
-        self._cells[panel].result = result
+        cell = self._cells[result.request.panel]
+        cell.result = result
+        if cell.bar is not None and result.colouring is not None:
+            cell.bar.set_limit(result.colouring.limit_mm)
         if self._canvas is not None:
-            self._canvas.set_surface(list(self._cells).index(panel), result)
+            self._canvas.set_surface(self._index(result.request.panel), result)
             self._frame_once(self._canvas)
+
+    def clear_surface(self, panel: Panel) -> None:
+        """Show nothing until the next surface comes."""
+        cell = self._cells.get(panel)
+        if cell is None:
+            return
+        cell.result = None
+        self.set_caption(panel, "", "")
+        if self._canvas is not None:
+            self._canvas.clear_surface(self._index(panel))
+
+    def show_ghost(self, points_mm: NDArray[np.float32] | None, faces: NDArray[np.int64] = NO_FACES) -> None:
+        """Lay a scan over the full shape, translucent; without faces as dots.
+
+        Args:
+            points_mm: vertices, ``[n, 3]``; None takes the scan away.
+            faces: vertex numbers of the triangles, ``[m, 3]``; none for a cloud of points.
+        """
+        if points_mm is self._ghost[0] and faces is self._ghost[1]:
+            return
+        self._ghost = (points_mm, faces)
+        if self._canvas is not None:
+            self._canvas.set_ghost(self._index(FULL_SHAPE), *self._ghost)
 
     def set_caption(self, panel: Panel, text: str, hint: str) -> None:
         """The line beneath a sub-plot, and more about it on hover."""
@@ -208,7 +281,7 @@ class ShapeView(QWidget):
         """Follow the theme."""
         self._theme = theme
         if self._canvas is not None:
-            self._canvas.set_background(theme.canvas)
+            self._canvas.set_colours(theme.canvas, ghost_colour(theme))
 
     def reset_camera(self) -> None:
         """Frame what is on screen, keeping the direction."""
@@ -282,6 +355,7 @@ class ShapeView(QWidget):
         for index, cell in enumerate(self._cells.values()):
             if cell.result is not None:
                 self._canvas.set_surface(index, cell.result)
+        self._canvas.set_ghost(self._index(FULL_SHAPE), *self._ghost)
         self._arrange()
         self._frame_once(self._canvas)
 
@@ -307,8 +381,8 @@ class ShapeView(QWidget):
 
     def _remove_cells(self) -> None:
         for cell in self._cells.values():
-            cell.title.deleteLater()
-            cell.volume.deleteLater()
+            for widget in cell.widgets:
+                widget.deleteLater()
         for line in self._separators:
             line.deleteLater()
         self._cells, self._separators, self._visible = {}, [], ()
@@ -322,7 +396,14 @@ class ShapeView(QWidget):
         volume = QLabel(self)
         volume.setObjectName("volume")
         volume.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
-        return Cell(title, volume)
+        bar = ColourBar(SIGNED[panel.kind], self) if panel.kind in SIGNED else None
+        if bar is not None:
+            bar.setToolTip(HINTS[panel.kind])
+        return Cell(title, volume, bar)
+
+    def _index(self, panel: Panel) -> int:
+        """Which of the canvas's sub-plots a panel has."""
+        return list(self._cells).index(panel)
 
     def _arrange(self) -> None:
         """Divide the canvas among the visible panels, keeping the user's zoom."""
@@ -333,7 +414,8 @@ class ShapeView(QWidget):
         places = map(self._pixels, cells(len(self._visible), columns))
         areas = dict(zip(self._visible, places, strict=True))
         first = areas[self._visible[0]]
-        self._drawn_height = drawn_height(first)
+        self._strip = strip_height(self._visible)
+        self._drawn_height = drawn_height(first, self._strip)
         old_fit, self._fit_scale = self._fit_scale, self._scale_to_fit(first, wide, high)
         if self._canvas is not None:
             self._canvas.camera.parallel_scale *= self._fit_scale / old_fit
@@ -353,13 +435,13 @@ class ShapeView(QWidget):
 
     def _scale_to_fit(self, area: QRect, wide: float, high: float) -> float:
         """Millimetres from the middle to the top of a sub-plot in which the framed box fits."""
-        height = drawn_height(area)
+        height = drawn_height(area, self._strip)
         return ROOM * max(high, wide * height / area.width()) / 2
 
     def _viewport(self, area: QRect) -> Viewport:
         """Where the shape is drawn inside ``area``, between its title and its caption."""
         top = area.top() + TITLE_PX
-        bottom = top + drawn_height(area)
+        bottom = top + drawn_height(area, self._strip)
         left, right = area.left() / self.width(), (area.left() + area.width()) / self.width()
         return left, 1 - bottom / self.height(), right, 1 - top / self.height()
 
@@ -370,18 +452,26 @@ class ShapeView(QWidget):
 
     def _place_labels(self, areas: dict[Panel, QRect]) -> None:
         for panel, cell in self._cells.items():
-            cell.title.setVisible(panel in areas)
-            cell.volume.setVisible(panel in areas)
             if panel in areas:
-                area = areas[panel]
-                cell.title.setGeometry(area.left(), area.top(), area.width(), TITLE_PX)
-                bottom = area.top() + area.height()
-                cell.volume.setGeometry(area.left(), bottom - CAPTION_PX, area.width(), CAPTION_PX)
-                cell.title.raise_()
-                cell.volume.raise_()
+                self._place_around(cell, areas[panel])
+            for widget in cell.widgets:
+                widget.setVisible(panel in areas)
+                widget.raise_()
+
+    def _place_around(self, cell: Cell, area: QRect) -> None:
+        """The title above the shape; beneath it the colour bar, and the caption under that."""
+        cell.title.setGeometry(area.left(), area.top(), area.width(), TITLE_PX)
+        height = CAPTION_PX + self._strip
+        top = area.top() + area.height() - height
+        cell.volume.setGeometry(area.left(), top, area.width(), height)
+        cell.volume.setContentsMargins(0, self._strip, 0, 0)
+        if cell.bar is not None:
+            width = min(WIDTH_PX, area.width())
+            cell.bar.setGeometry(area.left() + (area.width() - width) // 2, top, width, HEIGHT_PX)
 
     def _place_separators(self, areas: dict[Panel, QRect]) -> None:
         for line in self._separators:
+            line.hide()  # deleted later; it would be seen until then
             line.deleteLater()
         self._separators = []
         for edge in separators(list(areas.values())):

@@ -79,8 +79,21 @@ DARK = Theme(
 
 TEMPLATE_COLOUR = "#a7adb8"
 SHAPE_COLOUR = "#6f9fe8"
+BEFORE_COLOUR = "#a3b4d2"
+SCAN_COLOUR = "#b9b2a6"
 COVARIATE_COLOURS = ("#e29a3b", "#4fae86", "#c0699f", "#46a9bd", "#d0694f", "#8f7fd6", "#a7a042", "#7f8ea6")
 """Told apart by colour-blind eyes as far as eight colours can be; repeated beyond eight."""
+
+SIGNED_COLOURS = (
+    "#2957a8", "#4379c4", "#6b9bd3", "#9bb9d8", "#d1d5d8", "#d7b092", "#d3885a", "#c55f28", "#aa3600",
+)  # fmt: skip
+"""From minus to plus the limit, with nothing in the middle: equal steps to the eye (in OKLab), and told
+apart by colour-blind ones, because the ends differ in blueness."""
+
+UNSIGNED_COLOURS = (
+    "#e1e1bb", "#b9d0a8", "#8dbf9f", "#60ad9e", "#3598a0", "#1881a1", "#22689e", "#354d94", "#423182",
+)  # fmt: skip
+"""From nothing to the limit: equal steps to the eye (in OKLab), darker at each."""
 
 
 def covariate_colour(atlas: AtlasCard, name: str) -> str:
@@ -89,10 +102,21 @@ def covariate_colour(atlas: AtlasCard, name: str) -> str:
 
 
 def panel_colour(atlas: AtlasCard, panel: Panel) -> str:
-    """The colour of a panel's surface."""
+    """The colour of a panel's surface, where its vertices have none of their own."""
     if panel.kind == "effect":
         return covariate_colour(atlas, panel.covariate)
-    return TEMPLATE_COLOUR if panel.kind == "template" else SHAPE_COLOUR
+    plain = {"template": TEMPLATE_COLOUR, "scan": SCAN_COLOUR, "before": BEFORE_COLOUR}
+    return plain.get(panel.kind, SHAPE_COLOUR)
+
+
+def ghost_colour(theme: Theme) -> str:
+    """What lies translucent over a shape: grey that is told from the shape's colour and from the ground."""
+    return "#c3c8cf" if theme.is_dark else "#454b55"
+
+
+def scale_colours(is_signed: bool) -> tuple[str, ...]:
+    """The colours of a scale at equal distances from its low to its high end."""
+    return SIGNED_COLOURS if is_signed else UNSIGNED_COLOURS
 
 
 def resolved(choice: ThemeChoice) -> Theme:
@@ -168,8 +192,44 @@ def style_sheet(theme: Theme) -> str:
     QStatusBar::item {{ border: none; }}
     QProgressBar {{ background: {t.line}; border: none; border-radius: 3px; max-height: 6px; }}
     QProgressBar::chunk {{ background: {t.accent}; border-radius: 3px; }}
-    QScrollArea, #sidebar {{ background: {t.window}; border: none; }}
+    QScrollArea, #sidebar, #patientBar {{ background: {t.window}; border: none; }}
     #sidebar {{ border-right: 1px solid {t.line}; }}
+    #patientBar {{ border-left: 1px solid {t.line}; }}
+    #patientList {{ background: {t.raised}; border: 1px solid {t.line}; border-radius: 5px; padding: 2px;
+                outline: none; }}
+    #patientList:focus {{ border-color: {t.accent}; }}
+    #patientList::item {{ border-left: 3px solid transparent; border-radius: 3px; }}
+    #patientList::item:hover {{ background: {t.window}; }}
+    #patientList::item:selected {{ background: {t.line}; border-left-color: {t.accent}; color: {t.text}; }}
+    #sidebar QScrollBar:vertical, #patientBar QScrollBar:vertical {{ background: transparent; width: 10px;
+                margin: 0; }}
+    #sidebar QScrollBar::handle:vertical, #patientBar QScrollBar::handle:vertical {{ background: {t.line};
+                border-radius: 3px; margin: 2px; min-height: 32px; }}
+    #sidebar QScrollBar::handle:vertical:hover, #patientBar QScrollBar::handle:vertical:hover {{
+                background: {t.muted}; }}
+    #sidebar QScrollBar::add-line, #sidebar QScrollBar::sub-line,
+    #patientBar QScrollBar::add-line, #patientBar QScrollBar::sub-line {{ height: 0; }}
+    #patientBar QComboBox {{ background: {t.raised}; border: 1px solid {t.line}; border-radius: 5px;
+                padding: 3px 8px; color: {t.text}; }}
+    #patientBar QComboBox:hover, #patientBar QComboBox:focus {{ border-color: {t.accent}; }}
+    #patientBar QComboBox:disabled {{ color: {t.muted}; background: {t.window}; }}
+    #patientBar QComboBox::drop-down {{ border: none; width: 20px; }}
+    #patientBar QComboBox QAbstractItemView {{ background: {t.raised}; border: 1px solid {t.line};
+                selection-background-color: {t.accent}; selection-color: {t.on_accent}; outline: none; }}
+    #patientBar QComboBox QAbstractItemView::item {{ padding: 4px 8px; }}
+    #sidebar QCheckBox::indicator:unchecked, #patientBar QCheckBox::indicator:unchecked {{
+                background: {t.raised}; border: 1px solid {t.muted}; border-radius: 2px;
+                width: 12px; height: 12px; }}
+    #small {{ padding: 1px 8px; font-size: 9pt; }}
+    #section {{ font-size: 11pt; font-weight: 600; }}
+    #figure {{ font-weight: 600; }}
+    #changed {{ background: {t.raised}; border: 1px solid {t.accent}; border-radius: 6px; }}
+    #blocked {{ background: {t.error}; color: {t.on_error}; border-radius: 6px; padding: 8px 10px; }}
+    #primary {{ background: {t.accent}; border-color: {t.accent}; color: {t.on_accent}; padding: 6px 12px;
+                font-weight: 600; }}
+    #primary:hover, #primary:focus {{ border-color: {t.text}; }}
+    #primary:pressed {{ background: {t.line}; color: {t.text}; }}
+    #primary:disabled {{ background: {t.window}; border-color: {t.line}; color: {t.muted}; }}
     #title {{ font-size: 15pt; font-weight: 600; }}
     #covariate {{ font-weight: 600; }}
     #muted {{ color: {t.muted}; }}

@@ -90,12 +90,29 @@ class EllipsoidAtlas:
         return self._surface("template", {}, resolution, progress, should_stop)
 
     def effect(
-        self, name, value, latent=None, resolution=128, *, extrapolate=False, progress=None, should_stop=None
+        self,
+        name,
+        value,
+        latent=None,
+        resolution=128,
+        *,
+        extrapolate=False,
+        tracker=None,
+        progress=None,
+        should_stop=None,
     ):
         return self._surface(name, {name: value}, resolution, progress, should_stop)
 
     def shape(
-        self, covariates, latent=None, resolution=128, *, extrapolate=False, progress=None, should_stop=None
+        self,
+        covariates,
+        latent=None,
+        resolution=128,
+        *,
+        extrapolate=False,
+        tracker=None,
+        progress=None,
+        should_stop=None,
     ):
         return self._surface("shape", dict(covariates), resolution, progress, should_stop)
 

@@ -11,11 +11,13 @@ import textwrap
 from pathlib import Path
 
 import pytest
+from eggs import egg
 from PySide6.QtGui import QImage
 
 from naisr_model import __version__
 from naisr_model.errors import InputError
 from naisr_viewer import app
+from naisr_viewer.engine import Engine
 
 ROOT = Path(__file__).parents[2]
 DISPLAY = ("DISPLAY", "WAYLAND_DISPLAY")
@@ -79,9 +81,16 @@ def test_an_unknown_option_is_one_sentence_and_code_2(capsys):
 
 
 def test_a_bad_setting_ends_the_program_with_code_2(capsys, engine, atlas_file, monkeypatch):
-    monkeypatch.setattr(app, "Engine", lambda: engine)
+    monkeypatch.setattr(app, "Engine", lambda _: engine)
     assert app.main([str(atlas_file), "--set", "age=500"]) == 2
     assert "1 to 220 months" in capsys.readouterr().err
+
+
+def test_a_device_that_cannot_compute_ends_the_program_with_code_2(capsys):
+    assert app.main(["--device", "typewriter", "--set", "age=100"]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert "torch cannot compute on 'typewriter' here; choose cpu" in error
 
 
 def test_help_needs_nothing_heavy():
@@ -99,37 +108,73 @@ def test_help_needs_nothing_heavy():
     assert __version__ in done.stdout
 
 
-@pytest.fixture
-def stand_in() -> str:
-    """Code that puts the ellipsoids in the place of a trained atlas."""
-    return f"""
-        import runpy, sys
-        sys.path.insert(0, {str(ROOT)!r})
-        stand_in = runpy.run_path({str(Path(__file__).with_name("conftest.py"))!r})["EllipsoidAtlas"]
-        from naisr_viewer import app, engine
-        app.Engine = lambda: engine.Engine(lambda path: stand_in())
-    """
-
-
 @pytest.mark.skipif(shutil.which("Xvfb") is None, reason="needs a virtual display")
-def test_screenshot_and_demonstration_without_any_display(stand_in, atlas_file, tmp_path):
+def test_screenshot_and_demonstration_without_any_display(egg_atlas, tmp_path):
     picture, out = tmp_path / "picture.png", tmp_path / "out"
-    arguments = [str(atlas_file), "--screenshot", str(picture), "--demo", str(out), "--size", "800x600"]
-    done = run(f"{stand_in}\n        sys.exit(app.main({arguments!r} + ['--set', 'weight=50']))", *DISPLAY)
+    arguments = [str(egg_atlas), "--screenshot", str(picture), "--demo", str(out), "--size", "1000x700"]
+    code = f"import sys; from naisr_viewer import app; sys.exit(app.main({arguments!r} + ['--set', 'age=3']))"
+    done = run(code, *DISPLAY)
     assert done.returncode == 0, done.stderr
     assert "Traceback" not in done.stderr
     assert str(picture) in done.stdout
     assert str(out) in done.stdout
     image = QImage(str(picture))
-    assert (image.width(), image.height()) == (800, 600)
-    assert len({image.pixel(x, y) for x in range(340, 800, 7) for y in range(80, 560, 7)}) > 100
+    assert (image.width(), image.height()) == (1000, 700)
+    assert len({image.pixel(x, y) for x in range(340, 1000, 7) for y in range(80, 660, 7)}) > 100
     names = {path.name for path in out.iterdir()}
-    for covariate in ("age", "weight", "sex"):
-        assert {f"{covariate}-low.png", f"{covariate}-high.png"} <= names
-        assert f"dragged {covariate}" in done.stdout
-    record = json.loads((out / "ellipsoid-full-shape.json").read_text())
-    assert "ellipsoid-full-shape.stl" in names
-    assert record["covariates"]["weight"]["value"] == 35.0  # every slider was put back
+    assert {"age-low.png", "sex-high.png", "patient-fit.png", "patient-before-and-after.png"} <= names
+    assert "dragged age" in done.stdout and "dragged sex" in done.stdout
+    record = json.loads((out / "eggs-full-shape.json").read_text())
+    assert "eggs-full-shape.stl" in names
+    assert record["covariates"]["sex"]["value"] == 0.0  # every slider was put back
+    assert record["covariates"]["age"]["value"] > 6
+
+
+@pytest.mark.skipif(shutil.which("Xvfb") is None, reason="needs a virtual display")
+def test_a_scan_is_opened_at_once(egg_atlas, tmp_path):
+    scan = tmp_path / "p01.ply"
+    egg(5.0, 1.0).export(scan)
+    arguments = [str(egg_atlas), "--scan", str(scan), "--screenshot", str(tmp_path / "scan.png")]
+    done = run(f"import sys; from naisr_viewer import app; sys.exit(app.main({arguments!r}))", *DISPLAY)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "scan.png").is_file()
+    arguments[2] = str(tmp_path / "none.ply")
+    done = run(f"import sys; from naisr_viewer import app; sys.exit(app.main({arguments!r}))", *DISPLAY)
+    assert done.returncode == 2 and "none.ply" in done.stderr and done.stderr.count("\n") == 1
+
+
+@pytest.mark.skipif(shutil.which("Xvfb") is None, reason="needs a virtual display")
+def test_the_second_start_paints_the_first_picture_before_the_networks_are_imported(egg_atlas, tmp_path):
+    cache = tmp_path / "cache"
+    first = Engine(folder=cache)
+    first.open(egg_atlas)
+    first.prepare_previews(egg_atlas)
+    done = run(
+        f"""
+        import sys
+        from pathlib import Path
+        from naisr_viewer import app, engine, headless
+        from naisr_viewer.display import ensure_display
+        from naisr_viewer.state import visible_panels
+
+        def note(_count):
+            shown = [controller.shown.get(panel) for panel in visible_panels(controller.state)]
+            if shown and all(result is not None and result.is_exact for result in shown):
+                pictures.append({{"torch", "trimesh", "scipy", "igl"}} & set(sys.modules))
+
+        ensure_display((800, 600))
+        application, pictures, opened = app.make_application(), [], engine.Engine(folder=Path({str(cache)!r}))
+        window, controller = app.make_window(opened, Path({str(tmp_path / "settings.ini")!r}))
+        window.shapes.drawn.connect(note)
+        app._show(window, controller, Path({str(egg_atlas)!r}), None, {{}}, (800, 600))
+        headless.wait_until(lambda: bool(pictures), 60)
+        headless.wait_until(lambda: opened.has_previews(controller.state.atlas.path), 60)
+        window.close()
+        print("imported:", sorted(pictures[0]), "in the end:", "torch" in sys.modules)
+        """,
+        *DISPLAY,
+    )
+    assert done.stdout == "imported: [] in the end: True\n", done.stderr
 
 
 @pytest.fixture
@@ -148,7 +193,7 @@ def test_without_display_a_window_for_a_person_is_refused_in_words(no_display, c
 def test_without_display_and_xvfb_the_remedy_is_named(
     no_display, capsys, engine, atlas_file, monkeypatch, tmp_path
 ):
-    monkeypatch.setattr(app, "Engine", lambda: engine)
+    monkeypatch.setattr(app, "Engine", lambda _: engine)
     monkeypatch.setattr(shutil, "which", lambda _: None)
     assert app.main([str(atlas_file), "--screenshot", str(tmp_path / "x.png")]) == 2
     error = capsys.readouterr().err

@@ -13,7 +13,14 @@ from PySide6.QtGui import QImage
 from naisr_model import __version__
 from naisr_model.errors import InputError
 from naisr_viewer.controller import Controller, in_words
-from naisr_viewer.requests import EXACT_RESOLUTION, PREVIEW_RESOLUTION, ExportChoice, Origin, SurfaceResult
+from naisr_viewer.requests import (
+    EXACT_RESOLUTION,
+    PREVIEW_RESOLUTION,
+    ExportChoice,
+    Origin,
+    SurfaceResult,
+    request_for,
+)
 from naisr_viewer.state import FULL_SHAPE, TEMPLATE, Layout, Panel, all_panels
 from naisr_viewer.views.covariate_panel import CovariatePanel
 from naisr_viewer.views.main_window import MainWindow
@@ -42,6 +49,11 @@ class PanelSignals(QObject):
     value_settled = Signal(str, float)
     reset_requested = Signal(str)
     reset_all_requested = Signal()
+    follow_toggled = Signal(bool)
+
+
+class ShapeSignals(QObject):
+    drawn = Signal(int)
 
 
 def with_signals(fake: Mock, signals: QObject) -> Mock:
@@ -56,7 +68,7 @@ def with_signals(fake: Mock, signals: QObject) -> Mock:
 def window(qapp: QObject) -> Mock:
     fake = with_signals(create_autospec(MainWindow, instance=True), WindowSignals())
     fake.covariates = with_signals(create_autospec(CovariatePanel, instance=True), PanelSignals())
-    fake.shapes = create_autospec(ShapeView, instance=True)
+    fake.shapes = with_signals(create_autospec(ShapeView, instance=True), ShapeSignals())
     return fake
 
 
@@ -167,6 +179,17 @@ def test_one_drag_is_one_step_to_undo(ready, window):
     window.show_history.assert_called_with(False, True)
     window.redo_requested.emit()
     assert dict(ready.state.named)["age"] == 130.0
+
+
+def test_the_others_follow_while_one_is_dragged_and_come_back_with_it(ready, window):
+    """The children of the stand-in gain 0.31 kg a month."""
+    window.covariates.signals.follow_toggled.emit(True)
+    ready.move("age", 130.0)
+    ready.move("age", 160.0)
+    assert dict(ready.state.named)["weight"] == pytest.approx(35 + 0.31 * 60, abs=1.5)
+    ready.move("age", 100.0)
+    ready.settle("age", 100.0)
+    assert ready.state.values == pytest.approx((100.0, 35.0, 0.0))
 
 
 def test_undo_shows_remembered_surfaces_without_computing(ready, window, atlas):
@@ -327,7 +350,7 @@ def test_an_exact_surface_under_way_makes_room_for_the_slider(held, window):
 def test_a_result_for_values_left_behind_is_not_shown_at_rest(held, window, engine):
     controller, worker = held
     window.covariates.value_moved.emit("age", 120.0)
-    late = engine.surface(controller._request(AGE_ONLY, PREVIEW_RESOLUTION))
+    late = engine.surface(request_for(controller.state, AGE_ONLY, PREVIEW_RESOLUTION))
     window.covariates.value_settled.emit("age", 90.0)
     worker.delivered.emit((late,))
     assert controller.shown[AGE_ONLY].request.values != (("age", 120.0),)

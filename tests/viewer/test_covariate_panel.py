@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QColor
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
 from naisr_model.covariates import Covariate
-from naisr_viewer.state import ExplorerState, opened, with_value
+from naisr_viewer.patients import Fitted, Patient, Reading, Scan
+from naisr_viewer.state import AtlasCard, ExplorerState, opened, with_patient, with_value
 from naisr_viewer.views import covariate_panel as cp
-from naisr_viewer.views.theme import DARK, LIGHT, covariate_colour
+from naisr_viewer.views.theme import DARK, LIGHT, covariate_colour, palette
 
 
 @pytest.fixture
@@ -156,3 +161,107 @@ def test_another_atlas_replaces_the_rows(panel, card, qtbot):
     panel.show_atlas(card, LIGHT)
     assert panel.rows["age"] is not old
     assert list(panel.rows) == ["age", "weight", "sex"]
+
+
+def with_fit(card: AtlasCard) -> ExplorerState:
+    """A girl whose age and sex are known and whose weight was inferred."""
+    values = (("age", 84.0), ("weight", 21.34), ("sex", -1.0))
+    fit = Fitted(1, values, (("weight", 18.2, 34.9),), 48.0, 3.0, residual_mm=0.4, seconds=2.0)
+    points_mm, faces = np.zeros((3, 3), np.float32), np.zeros((0, 3), np.int64)
+    scan = Scan(points_mm, points_mm, faces, "p01.stl")
+    patient = Patient(1, "p01.stl", Reading(Path("p01.stl")), scan, (("age", 84.0), ("sex", -1.0)), fit)
+    return with_patient(opened(ExplorerState(), card), patient)
+
+
+def inked(histogram: cp.Histogram, colour: str) -> np.ndarray:
+    """Columns and rows of the pixels in this colour, ``[n, 2]``."""
+    image, wanted = histogram.grab().toImage(), QColor(colour)
+    places = [(x, y) for x in range(image.width()) for y in range(image.height())]
+    near = [
+        (x, y)
+        for x, y in places
+        if max(
+            abs(image.pixelColor(x, y).red() - wanted.red()),
+            abs(image.pixelColor(x, y).green() - wanted.green()),
+            abs(image.pixelColor(x, y).blue() - wanted.blue()),
+        )
+        < 20
+    ]
+    return np.array(near).reshape(-1, 2)
+
+
+@pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
+def test_the_patient_is_marked_under_the_slider(panel, card, theme):
+    panel.setPalette(palette(theme))
+    panel.set_theme(theme)
+    row = panel.rows["weight"]
+    assert len(inked(row.histogram, theme.text)) == 0
+    tick = inked(row.histogram, covariate_colour(card, "weight"))
+    panel.show_values(with_value(with_fit(card), "weight", 60))
+    mark = inked(row.histogram, theme.text)
+
+    def x_of(value: float) -> float:
+        share = (value - 4) / 91
+        return cp.HANDLE_PX / 2 + share * (row.histogram.width() - cp.HANDLE_PX)
+
+    band = mark[mark[:, 1] >= row.histogram.height() - cp.BAND_PX]
+    triangle = mark[mark[:, 1] < row.histogram.height() - cp.BAND_PX]
+    assert (band[:, 0].min(), band[:, 0].max()) == pytest.approx((x_of(18.2), x_of(34.9)), abs=1.5)
+    assert triangle[:, 0].mean() == pytest.approx(x_of(21.34), abs=1.5)
+    assert len(triangle) > 15
+    # The mean is still marked, from top to bottom except where the band is.
+    still = inked(row.histogram, covariate_colour(card, "weight"))
+    assert set(still[:, 0]) == set(tick[:, 0])
+    panel.show_values(opened(ExplorerState(), card))
+    assert len(inked(row.histogram, theme.text)) == 0
+
+
+def test_a_known_covariate_has_no_band(panel, card):
+    panel.show_values(with_fit(card))
+    histogram = panel.rows["age"].histogram
+    mark = inked(histogram, LIGHT.text)
+    assert len(mark) > 15 and mark[:, 1].max() < histogram.height() - cp.BAND_PX
+
+
+def test_marks_are_told_apart_on_hover(panel, card):
+    panel.show_values(with_fit(card))
+    age, weight, sex = (panel.rows[name].histogram.toolTip() for name in ("age", "weight", "sex"))
+    assert "Triangle: patient 84 months" in age and "95 %" not in age
+    assert "Tick: population mean 100 months" in age
+    assert "Triangle: patient 21.3 kg, 95 %: 18.2 to 34.9" in weight
+    assert "Triangle: patient F" in sex
+    panel.show_values(opened(ExplorerState(), card))
+    assert "patient" not in panel.rows["age"].histogram.toolTip()
+    assert f"{len(card.population.observed('age'))} shapes" in panel.rows["age"].histogram.toolTip()
+
+
+def test_home_is_the_patient_or_the_population_mean(panel, card):
+    row = panel.rows["age"]
+    assert row.reset.toolTip() == "Back to the population mean (100 months)"
+    assert panel.reset_all.text() == "Reset all"
+    state = with_fit(card)
+    panel.show_values(state)
+    assert row.reset.toolTip() == "Back to the patient (84 months)"
+    assert panel.rows["sex"].reset.toolTip() == "Back to the patient (F)"
+    assert panel.reset_all.text() == "Back to the patient"
+    assert not row.reset.isEnabled()
+    panel.show_values(with_value(state, "age", 100))
+    assert row.reset.isEnabled() and not panel.rows["weight"].reset.isEnabled()
+    panel.show_values(opened(ExplorerState(), card))
+    assert not row.reset.isEnabled() and panel.reset_all.text() == "Reset all"
+
+
+def test_following_is_asked_for_and_shown(panel, card, qtbot):
+    heard: list[bool] = []
+    panel.follow_toggled.connect(heard.append)
+    panel.show_values(replace(opened(ExplorerState(), card), follow=True))
+    assert panel.follow.isChecked() and heard == []
+    QTest.mouseClick(panel.follow, Qt.MouseButton.LeftButton, pos=QPoint(8, panel.follow.height() // 2))
+    assert heard == [False]
+
+
+def test_following_needs_two_continuous_covariates(panel, card):
+    assert panel.follow.isVisible()
+    of_one = replace(card, covariates=(card.covariates[0], card.covariates[2]))
+    panel.show_atlas(of_one, LIGHT)
+    assert not panel.follow.isVisible()

@@ -12,6 +12,7 @@ import trimesh
 from naisr_model.atlas import Atlas
 from naisr_model.errors import Cancelled, InputError
 from naisr_model.frames import Frame
+from naisr_viewer import cache
 from naisr_viewer.engine import CACHED_SURFACES, Engine
 from naisr_viewer.requests import Origin, SurfaceRequest, answers
 from naisr_viewer.state import FULL_SHAPE, TEMPLATE, Panel
@@ -176,8 +177,8 @@ def test_tables_of_a_file_with_other_contents_are_made_anew(engine, card, atlas,
 def test_a_broken_cache_costs_time_and_no_more(engine, card, atlas, tmp_path, damage):
     if damage == "truncated":
         engine.prepare_previews(card.path)
-        (file,) = (tmp_path / "cache").iterdir()
-        file.write_bytes(file.read_bytes()[:40])
+        for file in (tmp_path / "cache").iterdir():
+            file.write_bytes(file.read_bytes()[:40])
     else:
         (tmp_path / "cache").write_text("a file is in the way")
     atlas.calls.clear()
@@ -194,3 +195,130 @@ def test_tabulating_can_be_cancelled_and_leaves_nothing(engine, card, tmp_path):
         engine.prepare_previews(card.path, should_stop=lambda: True)
     assert not engine.has_previews(card.path)
     assert not (tmp_path / "cache").exists()
+
+
+class Loader:
+    """Loads the stand-in and counts; ``meanwhile`` happens while it does."""
+
+    def __init__(self, atlas, meanwhile=lambda: None) -> None:
+        self.atlas, self.meanwhile, self.count = atlas, meanwhile, 0
+
+    def __call__(self, path: Path):
+        self.count += 1
+        self.meanwhile()
+        return self.atlas
+
+
+def test_the_second_start_shows_the_template_without_the_networks(engine, card, atlas, tmp_path):
+    first = engine.surface(ask(card.path, TEMPLATE))
+    engine.prepare_previews(card.path)
+    loader = Loader(atlas)
+    again = Engine(loader, tmp_path / "cache")
+    described = again.open(card.path)
+    assert (described.path, described.name) == (card.path, card.name)
+    assert described.covariates == card.covariates
+    assert described.population.to_json() == card.population.to_json()
+    for question in (
+        ask(card.path, TEMPLATE),
+        ask(card.path, Panel("effect", "age"), age=100.0),
+        ask(card.path),
+    ):
+        shown = again.cached(question)
+        assert shown is not None
+        assert shown.is_exact
+        for kept, made in [(shown.points_mm, first.points_mm), (shown.normals, first.normals)]:
+            np.testing.assert_array_equal(kept, made, strict=True)
+        np.testing.assert_array_equal(shown.faces, first.faces, strict=True)
+        assert shown.volume_cm3 == first.volume_cm3
+    assert again.was_kept(card.path) and not engine.was_kept(card.path)
+    assert loader.count == 0
+
+
+def test_the_networks_are_loaded_once_and_when_they_are_needed(engine, card, atlas, tmp_path):
+    engine.prepare_previews(card.path)
+    loader = Loader(atlas)
+    again = Engine(loader, tmp_path / "cache")
+    again.open(card.path)
+    moved = again.surface(ask(card.path, age=150.0))
+    assert moved.volume_cm3 == pytest.approx(atlas.volume_cm3(age=150.0), rel=0.01)
+    again.prepare_previews(card.path)
+    assert again.has_previews(card.path)
+    assert loader.count == 1
+
+
+def truncated(contents: bytes) -> bytes:
+    return contents[: len(contents) // 2]
+
+
+def flipped(contents: bytes) -> bytes:
+    place = len(contents) // 3  # among the coordinates
+    return contents[:place] + bytes([contents[place] ^ 1]) + contents[place + 1 :]
+
+
+@pytest.mark.parametrize(
+    "damaged", [truncated, flipped, lambda _: b"", lambda _: b"not an archive"], ids=["half", "bit", "0", "x"]
+)
+def test_a_damaged_opening_is_made_again(engine, card, atlas, tmp_path, damaged):
+    engine.prepare_previews(card.path)
+    (file,) = (tmp_path / "cache").glob(f"*.{cache.OPENING}")
+    sound = file.read_bytes()
+    file.write_bytes(damaged(sound))
+    loader = Loader(atlas)
+    again = Engine(loader, tmp_path / "cache")
+    assert again.open(card.path).name == card.name
+    assert loader.count == 1
+    assert again.cached(ask(card.path, TEMPLATE)) is None
+    again.prepare_previews(card.path)
+    third = Engine(loader, tmp_path / "cache")
+    third.open(card.path)
+    assert third.was_kept(card.path)
+
+
+@pytest.mark.parametrize("changed", ["file", "program"])
+def test_nothing_old_is_shown_of_another_file_or_by_another_version(
+    engine, card, atlas, tmp_path, monkeypatch, changed
+):
+    engine.prepare_previews(card.path)
+    if changed == "file":
+        card.path.write_bytes(b"trained on")
+    else:
+        monkeypatch.setattr(cache, "_program_digest", lambda: b"newer")
+    loader = Loader(atlas)
+    again = Engine(loader, tmp_path / "cache")
+    again.open(card.path)
+    assert loader.count == 1
+    assert again.cached(ask(card.path, TEMPLATE)) is None
+
+
+def test_the_template_of_a_file_is_never_shown_with_the_networks_of_another(engine, card, atlas, tmp_path):
+    engine.prepare_previews(card.path)
+    again = Engine(Loader(atlas), tmp_path / "cache")
+    again.open(card.path)
+    card.path.write_bytes(b"trained on")
+    with pytest.raises(InputError, match="open it again"):
+        again.surface(ask(card.path, age=150.0))
+    again.open(card.path)
+    assert again.surface(ask(card.path, age=150.0)).is_exact
+
+
+def test_a_file_that_is_replaced_while_it_is_read_is_read_again(atlas, atlas_file, tmp_path):
+    contents = iter([b"trained on", b"trained on"])
+    loader = Loader(atlas, lambda: atlas_file.write_bytes(next(contents)))
+    first = Engine(loader, tmp_path / "cache")
+    first.open(atlas_file)
+    assert loader.count == 2
+    first.prepare_previews(atlas_file)
+    again = Engine(Loader(atlas), tmp_path / "cache")
+    again.open(atlas_file)
+    assert again.was_kept(atlas_file)
+
+
+def test_the_cache_is_bounded(atlas, tmp_path):
+    engine = Engine(Loader(atlas), tmp_path / "cache")
+    for number in range(cache.KEPT_FILES + 2):
+        path = tmp_path / f"{number}.safetensors"
+        path.write_bytes(bytes([number]))
+        engine.open(path)
+        engine.prepare_previews(path)
+    for ending in (cache.OPENING, cache.DISPLACEMENTS):
+        assert len(list((tmp_path / "cache").glob(f"*.{ending}"))) == cache.KEPT_FILES

@@ -86,6 +86,7 @@ def test_the_whole_program_is_timed_without_any_display(egg_atlas, tmp_path):
     assert "Traceback" not in done.stderr
     figures = json.loads(report.read_text())
     assert 0 < figures["window_visible_s"] < figures["first_picture_s"]
+    assert figures["first_picture_was_kept"] is False
     assert figures["first_picture_s"] < figures["previews_ready_s"]
     assert figures["covariate"] == "age"
     assert figures["views"] == 4

@@ -118,3 +118,12 @@ def test_synchronous_mode_is_done_when_submit_returns(qtbot):
     worker.delivered.connect(heard.append)
     worker.submit(lambda deliver, progress, should_stop: deliver("at once"))
     assert heard == ["at once"]
+
+
+def test_cancelling_what_has_not_begun_ends_in_idleness(qtbot, worker, heard):
+    """Whoever gets there first, the thread that takes the job or the one that cancels it."""
+    for _ in range(50):
+        with qtbot.waitSignal(worker.idle, timeout=2000):
+            worker.submit(lambda deliver, progress, should_stop: deliver("late"))
+            worker.cancel()
+    assert heard == []

@@ -1,0 +1,123 @@
+"""The line beneath each sub-plot, and what it means."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from naisr_viewer.requests import Colouring, SurfaceResult
+from naisr_viewer.state import ExplorerState, is_seen
+
+DOUBTFUL, DOUBTFUL_CHANGE = "preview uncertain", "correspondence uncertain"
+DOUBTFUL_HINT = (
+    "The deformation folds here, so the preview may lack or invent pieces; the exact surface follows at rest."
+)
+DOUBTFUL_CHANGE_HINT = (
+    "The deformation folds here, so which point of the earlier surface belongs to one of the later is unsure."
+)
+UNSEEN = "outside the data"
+UNSEEN_HINT = (
+    "Hardly anyone behind the atlas is near this combination of covariates (those not moved here are at "
+    "their mean), so the shape is a guess."
+)
+DISTANCE_HINT = (
+    "Distance of the scan to the full shape along its normal, in mm, to first order: "
+    "positive where the scan lies outside the shape."
+)
+CERTAINTY_HINT = (
+    "Half of the 95 % interval of the surface's place along its normal, in mm, for someone known by one "
+    "scan; the interval of the volume stands under the full shape."
+)
+CHANGE_HINT = (
+    "How far the surface has moved along its normal since “before”, in mm, point by point: "
+    "positive where it has moved outwards."
+)
+
+
+WORTH_TELLING = 0.05
+"""Share of a surface beyond its colour scale from which on that is said."""
+
+
+def caption(state: ExplorerState, result: SurfaceResult) -> tuple[str, str]:
+    """Rich text for beneath a surface, and a hint for who hovers over it."""
+    assert state.atlas is not None
+    if result.request.panel.kind == "scan":
+        return _large(_scan_volume(state)) + _mean_distance(result), DISTANCE_HINT
+    if len(result.faces) == 0:
+        return "no surface at these values", "The signed distance is nowhere zero inside the box."
+    text, hint = _measured(result)
+    if result.doubtful:
+        if result.request.panel.kind == "change":
+            return f"{text}<br>{DOUBTFUL_CHANGE}", DOUBTFUL_CHANGE_HINT
+        return f"{text}<br>{DOUBTFUL}", DOUBTFUL_HINT
+    if is_seen(state.atlas.population, dict(result.request.values)):
+        return text, hint
+    return f"{text}<br>{UNSEEN}", UNSEEN_HINT
+
+
+def volume(cm3: float, margin_cm3: float | None = None) -> str:
+    """A volume with digits that mean something: ``48.3 cm³``, ``61.2 ± 7.0 cm³``, ``69,100 ± 5,900 cm³``.
+
+    Beside a margin it ends with the margin's second digit.
+    """
+    if not margin_cm3 or not math.isfinite(margin_cm3):
+        return f"{cm3:,.{0 if abs(cm3) >= 1000 else 1}f} cm³"
+    digits = 1 - math.floor(math.log10(margin_cm3))
+    places = max(0, digits)
+    return f"{round(cm3, digits):,.{places}f} ± {round(margin_cm3, digits):,.{places}f} cm³"
+
+
+def gained(cm3: float, before_cm3: float, margin_cm3: float | None = None) -> str:
+    """A difference of volumes: ``+12.7 cm³ (+26 %)``; with no more digits than the later volume has."""
+    difference, digits = cm3 - before_cm3, 0 if before_cm3 >= 1000 else 1
+    if margin_cm3:
+        digits = min(digits, 1 - math.floor(math.log10(margin_cm3)))
+    share = f" ({100 * difference / before_cm3:+.0f} %)" if before_cm3 else ""
+    return f"{round(difference, digits):+,.{max(0, digits)}f} cm³{share}".replace("-", "−")
+
+
+def _measured(result: SurfaceResult) -> tuple[str, str]:
+    if result.request.panel.kind == "certainty":
+        return _mean_margin(result), CERTAINTY_HINT
+    if result.request.panel.kind == "change":
+        return _change(result), CHANGE_HINT
+    within = "" if result.volume_margin_cm3 is None else ", ± half of its 95 % interval"
+    return _large(volume(result.volume_cm3, result.volume_margin_cm3)), f"Enclosed volume{within}"
+
+
+def _scan_volume(state: ExplorerState) -> str:
+    scan = state.shown.scan if state.shown else None
+    return "open surface" if scan is None or scan.volume_cm3 is None else volume(scan.volume_cm3)
+
+
+def _mean_distance(result: SurfaceResult) -> str:
+    if result.colouring is None:
+        return ""
+    mean_mm = np.abs(result.colouring.values_mm).mean()
+    return f"<br>mean distance {mean_mm:.2f} mm{_beyond(result.colouring)}"
+
+
+def _mean_margin(result: SurfaceResult) -> str:
+    if result.colouring is None:
+        return _large("…")
+    mean_mm = result.colouring.values_mm.mean()
+    return _large(f"± {mean_mm:.2f} mm") + f"<br>mean 95 % margin{_beyond(result.colouring)}"
+
+
+def _change(result: SurfaceResult) -> str:
+    if result.volume_before_cm3 is None or result.colouring is None:
+        return _large("…")
+    text = gained(result.volume_cm3, result.volume_before_cm3, result.volume_margin_cm3)
+    beyond = _beyond(result.colouring).removeprefix(" · ")
+    return _large(text) + (f"<br>{beyond}" if beyond else "")
+
+
+def _beyond(colouring: Colouring) -> str:
+    """A colour at the end of its scale says less than it seems to."""
+    share = float((np.abs(colouring.values_mm) > colouring.limit_mm).mean())
+    return f" · {100 * share:.0f} % beyond the scale" if share > WORTH_TELLING else ""
+
+
+def _large(text: str) -> str:
+    return f'<span style="font-size:12pt">{text}</span>'

@@ -1,0 +1,121 @@
+"""What the window knows of patients: their scans and fits, as frozen values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Named = tuple[tuple[str, float], ...]
+"""Real covariate values by name, hashable."""
+
+Method = Literal["none", "icp", "landmarks"]
+"""How a scan is moved to the atlas."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How a patient's file is read and placed.
+
+    Attributes:
+        path: a mesh, whole or in part, a label volume or a cloud of points.
+        label: which label of a volume; None where there is only one.
+        scale: millimetres per unit of the file; None to guess where the size is implausible.
+        align: how it is moved to the atlas.
+        landmarks: a CSV name,x,y,z in the coordinates of the file; for ``landmarks``.
+    """
+
+    path: Path
+    label: int | None = None
+    scale: float | None = None
+    align: Method = "none"
+    landmarks: Path | None = None
+
+
+@dataclass(frozen=True)
+class Labels:
+    """A label volume of which one label is to be chosen.
+
+    Attributes:
+        reading: the file, still without a label.
+        titles: number and description of each label.
+    """
+
+    reading: Reading
+    titles: tuple[tuple[int, str], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """A patient's measured shape in the frame of the atlas.
+
+    Attributes:
+        points_mm: vertices for display, float32 ``[n, 3]``.
+        normals: unit normals there, float32 ``[n, 3]``; 0 for a cloud of points.
+        faces: vertex numbers of the triangles, int64 ``[m, 3]``; none for a cloud of points.
+        source: what was read, for example ``p01.stl, 12,034 faces``.
+        volume_cm3: enclosed volume; None where the surface is open.
+        alignment: how it was moved to the atlas, a sentence; empty where it was not.
+        notes: what was repaired and what is odd, a sentence each.
+        blocked: what forbids a fit and what to do about it, a sentence; empty where nothing does.
+    """
+
+    points_mm: NDArray[np.float32]
+    normals: NDArray[np.float32]
+    faces: NDArray[np.int64]
+    source: str
+    volume_cm3: float | None = None
+    alignment: str = ""
+    notes: tuple[str, ...] = ()
+    blocked: str = ""
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """What a fit found.
+
+    Attributes:
+        person: names the code in requests; every fit has another one, and 0 is the population average.
+        values: real values of all covariates.
+        intervals: name, low and high end (95 %) of each inferred covariate.
+        volume_cm3: of the fitted shape.
+        volume_margin_cm3: half of its 95 % interval; None where the shape is the template.
+        residual_mm: mean distance of the scan to the fitted surface.
+        seconds: what the fit took.
+        remarks: what the shape does not settle, a sentence each.
+    """
+
+    person: int
+    values: Named
+    intervals: tuple[tuple[str, float, float], ...]
+    volume_cm3: float
+    volume_margin_cm3: float | None
+    residual_mm: float
+    seconds: float
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Patient:
+    """One scan that is open.
+
+    Attributes:
+        key: tells the open scans apart.
+        name: what the list shows, for example ``p01.stl``.
+        reading: how the file was read.
+        scan: the measured shape.
+        known: covariates that are given; the others are inferred.
+        fit: None before the first fit.
+        is_changed: whether the file has changed on the disk since it was read.
+    """
+
+    key: int
+    name: str
+    reading: Reading
+    scan: Scan
+    known: Named = ()
+    fit: Fitted | None = None
+    is_changed: bool = False
