@@ -35,6 +35,7 @@ CHANGE_HINT = (
 )
 
 
+LATER = "; away from the patient's own covariates the true doubt is larger"
 WORTH_TELLING = 0.05
 """Share of a surface beyond its colour scale from which on that is said."""
 
@@ -82,7 +83,7 @@ def _measured(result: SurfaceResult) -> tuple[str, str]:
         return _mean_margin(result), CERTAINTY_HINT
     if result.request.panel.kind == "change":
         return _change(result), CHANGE_HINT
-    within = "" if result.volume_margin_cm3 is None else ", ± half of its 95 % interval"
+    within = "" if result.volume_margin_cm3 is None else f", ± half of its 95 % interval{LATER}"
     return _large(volume(result.volume_cm3, result.volume_margin_cm3)), f"Enclosed volume{within}"
 
 
