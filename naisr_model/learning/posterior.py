@@ -67,9 +67,11 @@ def posterior_of(network: Naisr, target: Target, prior: Prior, fit: ShapeFit) ->
     problem = Problem(network, prior, fixed, INDEPENDENT_POINTS)
     parameters = problem.pack(fit.covariates, fit.latent)
     rows = evaluate(problem, draw_sample(target, POINTS, SEED), parameters)
+    # Of a part, what was not seen is no surer than the code.
+    surface_points = FOLLOWED_POINTS if len(target.space) else INDEPENDENT_POINTS
     believed, followed = (
         linearise(dataclasses.replace(problem, independent=points), rows, parameters, rows.noise).hessian
-        for points in (INDEPENDENT_POINTS, FOLLOWED_POINTS)
+        for points in (INDEPENDENT_POINTS, surface_points)
     )
     along = np.asarray(np.linalg.inv(followed), dtype=np.float64)
     joint = _joint_covariance(fit.spread, believed)
