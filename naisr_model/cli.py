@@ -535,8 +535,7 @@ def calibration(
     from naisr_model.evaluation.calibration import calibration as run
     from naisr_model.evaluation.calibration import calibration_markdown
 
-    if patients < 1:
-        raise InputError(f"--patients is {patients}; give at least 1")
+    _require_at_least("--patients", patients, 1)
     names = [name.strip() for name in known.split(",") if name.strip()]
     with _bar("fitting") as progress, _stoppable() as stop:
         report = run(Atlas.load(atlas), patients, names, progress=progress, should_stop=stop)

@@ -153,8 +153,7 @@ class Controller(QObject):
         """Show an atlas that is open in the engine; covariates left out are at their mean."""
         self.shown = {}
         self._preparing = None
-        self._history = History()
-        self._before_move = None
+        self._leave()
         self._remember(card.path)
         state = opened(self.state, card)
         for name, value in values.items():
@@ -311,7 +310,7 @@ class Controller(QObject):
         self._refresh()
 
     def _leave(self) -> None:
-        """Another patient comes; what was done to the covariates of the last one ends here."""
+        """Another patient or atlas comes; what was done to the covariates so far ends here."""
         self._history = History()
         self._before_move = None
         self._window.shapes.set_moving(False)

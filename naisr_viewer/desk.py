@@ -99,7 +99,7 @@ class PatientDesk(QObject):
 
     def close(self, key: int) -> None:
         """Forget a patient."""
-        patient = self._patient(key)
+        patient = self._controller.state.find(key)
         if patient is None:
             return
         self._controller.go(without_patient(self._controller.state, key))
@@ -161,9 +161,6 @@ class PatientDesk(QObject):
                 return True
         return False
 
-    def _patient(self, key: int) -> Patient | None:
-        return next((each for each in self._controller.state.patients if each.key == key), None)
-
     def _read(self, order: Order) -> None:
         """Read now, or when what is under way has ended."""
         self._waiting.append(order)
@@ -199,7 +196,7 @@ class PatientDesk(QObject):
 
     def _show_read(self, order: Order, stamp: Stamp, scan: Scan) -> None:
         """A scan that was read differently has to be fitted again."""
-        old = self._patient(order.key)
+        old = self._controller.state.find(order.key)
         name = old.name if old is not None else self._name(order.reading)
         patient = Patient(order.key, name, order.reading, scan, order.known)
         self._stamps[order.key] = stamp
@@ -210,7 +207,7 @@ class PatientDesk(QObject):
         self._look_at_files()
 
     def _show_fit(self, found: Found) -> None:
-        patient = self._patient(found.key)
+        patient = self._controller.state.find(found.key)
         if patient is None or patient.scan is not found.scan:
             self._clinic.forget(found.fit)
             return

@@ -125,7 +125,7 @@ class ExplorerState:
     @property
     def shown(self) -> Patient | None:
         """The patient that is shown."""
-        return next((each for each in self.patients if each.key == self.patient), None)
+        return self.find(self.patient)
 
     @property
     def fit(self) -> Fitted | None:
@@ -135,7 +135,7 @@ class ExplorerState:
     @property
     def reference(self) -> Fitted | None:
         """The fit that is compared with."""
-        other = next((each for each in self.patients if each.key == self.compared), None)
+        other = self.find(self.compared)
         return (other and other.fit) or self.fit
 
     @property
@@ -149,6 +149,10 @@ class ExplorerState:
         if self.fit is not None:
             return tuple(value for _, value in self.fit.values)
         return self.atlas.centre if self.atlas else ()
+
+    def find(self, key: int | None) -> Patient | None:
+        """An open patient; None where there is none with this key."""
+        return next((each for each in self.patients if each.key == key), None)
 
     def with_names(self, values: Values) -> Named:
         """Values in the atlas's order with their names."""
