@@ -102,11 +102,32 @@ def test_bad_input_gets_one_sentence_and_exit_code_2(
     assert not list(tmp_path.iterdir())
 
 
-def test_help_is_there_without_heavy_imports():
+@pytest.mark.parametrize("word", ["--help", "--version"])
+def test_help_is_there_without_heavy_imports(word):
     probe = (
         "import sys; from naisr_model import cli\n"
-        "try: cli.main(['--help'])\n"
-        "finally: assert 'torch' not in sys.modules and 'pyvista' not in sys.modules"
+        f"try: cli.main([{word!r}])\n"
+        "finally: assert not {'torch', 'numpy', 'pyvista'} & set(sys.modules)"
     )
-    done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
-    assert all(word in done.stdout for word in ("prepare", "train", "mesh", "evaluate", "info"))
+    subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
+
+
+def test_the_package_runs_as_a_module():
+    command = [sys.executable, "-m", "naisr_model.cli"]
+    done = subprocess.run([*command, "--help"], capture_output=True, text=True, check=True)
+    assert all(word in done.stdout for word in ("prepare", "train", "mesh", "fit", "evaluate", "bench"))
+    assert subprocess.run([*command, "fly"], capture_output=True, check=False).returncode == 2
+
+
+@pytest.mark.parametrize("name", ["reconstruction", "transfer", "completion", "fitting"])
+def test_every_evaluation_says_what_its_options_mean(naisr, name):
+    code, out, _ = naisr("evaluate", name, "--help")
+    told = " ".join(out.replace("\u2502", " ").split())
+    assert code == 0
+    for words in (
+        "the .safetensors file",
+        "--store PATH where its held-out shapes are",
+        "--limit INT at most",
+    ):
+        assert words in told
+    assert "--json PATH also write the figures to this file" in told

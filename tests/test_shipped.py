@@ -12,6 +12,7 @@ from naisr_model.data.align import rigid_transform
 from naisr_model.data.populations import airway
 from naisr_model.evaluation.metrics import compare, component_count, hausdorff_x100
 from naisr_model.evaluation.reconstruction import fit_all, held_out_shapes, plausible_values
+from naisr_model.shipped import shipped_atlas
 from naisr_model.surface.fields import shape_field
 from naisr_model.surface.isosurface import isosurface
 from naisr_model.surface.lattice import Lattice
@@ -23,6 +24,10 @@ RESOURCES = Path(__file__).parents[1] / "resources"
 @pytest.fixture(scope="module")
 def atlas() -> Atlas:
     return Atlas.load(RESOURCES / "airway.safetensors")
+
+
+def test_the_program_finds_its_atlas():
+    assert shipped_atlas() == RESOURCES / "airway.safetensors"
 
 
 @pytest.mark.parametrize("name", ["airway", "bodies"])

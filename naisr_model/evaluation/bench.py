@@ -609,18 +609,3 @@ def _memory_bytes() -> float:
         return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
     except (AttributeError, ValueError):
         return math.nan
-
-
-def default_atlas() -> Path:
-    """The airway atlas that comes with the program.
-
-    Raises:
-        InputError: when it was not installed.
-    """
-    root = Path(__file__).parents[2]
-    places = (root / "resources", root / "naisr_viewer" / "_resources")
-    found = (place / "airway.safetensors" for place in places if (place / "airway.safetensors").exists())
-    path = next(found, None)
-    if path is None:
-        raise InputError("the shipped airway atlas is not installed; give the path of an atlas")
-    return path

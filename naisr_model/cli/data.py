@@ -1,0 +1,67 @@
+"""Commands that make data to train on: ``populate`` and ``prepare``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from naisr_model.cli.console import bar, stoppable
+
+
+def populate(name: str, out: Path, *, patients: int | None = None, seed: int = 0) -> None:
+    """Write a synthetic population (meshes, landmarks, CSV) as a hospital would hand it over.
+
+    Args:
+        name: airway or bodies.
+        out: folder to write into.
+        patients: how many patients; left out, the population's own number.
+        seed: the same seed gives the same files.
+    """
+    from naisr_model.data.populations import population
+
+    size = {} if patients is None else {"patients": patients}
+    with bar(f"writing {name}") as progress, stoppable() as stop:
+        table = population(name).write_population(out, seed=seed, progress=progress, should_stop=stop, **size)
+    print(table)
+
+
+def prepare(
+    table: Path,
+    *,
+    out: Path,
+    surface_samples: int = 100_000,
+    near_samples: int = 400_000,
+    uniform_samples: int = 100_000,
+    held_out: float = 0.2,
+    seed: int = 0,
+    workers: int | None = None,
+) -> None:
+    """Turn a CSV of meshes and covariates into a store of samples to train on.
+
+    A run that was stopped goes on where it was. Meshes that cannot be used are listed with the
+    reason and left out.
+
+    Args:
+        table: CSV with the columns mesh, subject, visit, then covariates; a TOML file of the same
+            name beside it may set units, kinds and the alignment.
+        out: folder of the store.
+        surface_samples: points with normals on each surface.
+        near_samples: signed distances close to each surface.
+        uniform_samples: signed distances anywhere in the box.
+        held_out: share of the subjects kept for evaluation.
+        seed: of the split and of the samples.
+        workers: processes; left out, one a core.
+    """
+    from naisr_model.data.prepare import PrepareOptions
+    from naisr_model.data.prepare import prepare as run
+
+    options = PrepareOptions(surface_samples, near_samples, uniform_samples, held_out, seed, workers)
+    with bar("preparing") as progress, stoppable() as stop:
+        report = run(table, out, options=options, progress=progress, should_stop=stop)
+    for remark in report.rejected:
+        print(f"rejected {remark.path} (row {remark.row}): {remark.reason}")
+    for remark in report.warnings:
+        print(f"warning {remark.path} (row {remark.row}): {remark.reason}")
+    print(
+        f"{len(report.accepted)} shapes in {out} ({len(report.skipped)} were there already), "
+        f"{len(report.rejected)} rejected"
+    )

@@ -1,0 +1,158 @@
+"""Commands about one patient's shape: ``fit``, ``transfer`` and ``evolve``."""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from cyclopts import Parameter
+
+from naisr_model.cli.console import bar, stoppable, write_json
+from naisr_model.cli.options import AtlasFile, JsonFile, pairs
+
+Patient = Annotated[Path, Parameter(help="a mesh, whole or in part, a label volume or a cloud of points.")]
+
+
+@Parameter(name="*")
+@dataclasses.dataclass(frozen=True)
+class Reading:
+    """How a patient's file is read.
+
+    Attributes:
+        known: covariates of the scan, as age=84,weight=20.4,sex=M; the others are inferred.
+        label: which label of a volume, its number or its name.
+        scale: millimetres per unit of the file; left out, it is guessed where the size is implausible.
+        align: none, icp or landmarks; onto the atlas's shape at the known covariates.
+        landmarks: CSV name,x,y,z in the coordinates of the file.
+    """
+
+    known: str = ""
+    label: str | None = None
+    scale: float | None = None
+    align: Literal["none", "icp", "landmarks"] = "none"
+    landmarks: Path | None = None
+
+
+_AS_IT_IS = Reading()
+
+
+def fit(
+    patient: Patient,
+    *,
+    atlas: AtlasFile,
+    reading: Reading = _AS_IT_IS,
+    out: Annotated[
+        Path | None, Parameter(help="folder for the fitted surface, a table and a picture.")
+    ] = None,
+    json_file: JsonFile = None,
+) -> None:
+    """Fit a patient's shape: covariates that are not given are inferred, all with 95 % intervals."""
+    from naisr_model.evaluation.evolution import fit_record, write_series
+
+    fitted, intake = _fitted(patient, atlas, reading)
+    record = fit_record(fitted)
+    _tell_fit(fitted, record["alternatives"])
+    if out is not None:
+        write_series(out, [fitted.individual])
+    write_json(json_file, {"patient": intake.to_json(), **record})
+
+
+def transfer(
+    patient: Patient,
+    *,
+    atlas: AtlasFile,
+    to: Annotated[
+        str,
+        Parameter(
+            help="covariates to show the patient at, as age=120,weight=28.5; the others stay as they are."
+        ),
+    ],
+    reading: Reading = _AS_IT_IS,
+    out: Annotated[Path | None, Parameter(help="folder for both surfaces, a table and a picture.")] = None,
+    json_file: JsonFile = None,
+) -> None:
+    """Show a patient's shape at other covariates, what makes the patient an individual kept."""
+    from naisr_model.evaluation.evolution import parsed
+
+    fitted, intake = _fitted(patient, atlas, reading)
+    moved = fitted.at(parsed(fitted.individual.atlas, pairs("--to", to)))
+    _tell_series(intake, [fitted.individual, moved], out, json_file)
+
+
+def evolve(
+    patient: Patient,
+    *,
+    atlas: AtlasFile,
+    reading: Reading = _AS_IT_IS,
+    along: Annotated[str, Parameter(help="the covariate that moves.")] = "age",
+    start: Annotated[
+        float | None, Parameter(name="--from", help="its first value; left out, the patient's.")
+    ] = None,
+    stop: Annotated[
+        float | None, Parameter(name="--to", help="its last value; left out, the largest observed one.")
+    ] = None,
+    steps: Annotated[int, Parameter(help="shapes on the way, both ends included.")] = 6,
+    path: Annotated[
+        str,
+        Parameter(
+            help="population (the others grow as usual), only (the effect of this covariate by itself), "
+            "or a CSV whose header names covariates, a row for each step."
+        ),
+    ] = "population",
+    out: Annotated[Path | None, Parameter(help="folder for the surfaces, a table and a picture.")] = None,
+    json_file: JsonFile = None,
+) -> None:
+    """Follow a patient's shape along one covariate."""
+    from naisr_model.evaluation.evolution import evolution
+
+    fitted, intake = _fitted(patient, atlas, reading)
+    _tell_series(intake, evolution(fitted, along, start, stop, steps, path), out, json_file)
+
+
+def _fitted(patient: Path, atlas: Path, reading: Reading) -> tuple[Any, Any]:
+    """The fit, and how the file was brought into the frame of the atlas."""
+    from naisr_model.atlas import Atlas
+    from naisr_model.evaluation.evolution import parsed
+    from naisr_model.evaluation.intake import take_in
+
+    loaded = Atlas.load(atlas)
+    options = dataclasses.asdict(reading)
+    known = parsed(loaded, pairs("--known", options.pop("known")))
+    with stoppable() as stop:
+        intake = take_in(patient, loaded, known, **options, should_stop=stop)
+    for sentence in intake.sentences:
+        print(f"naisr: {sentence}", file=sys.stderr)
+    with bar("fitting") as progress, stoppable() as stop:
+        fitted = loaded.fit(intake.patient.mesh_mm, known, progress=progress, should_stop=stop)
+    return fitted, intake
+
+
+def _tell_fit(fitted: Any, alternatives: Sequence[Mapping[str, Any]]) -> None:
+    for covariate in fitted.individual.atlas.covariates:
+        name, interval = covariate.name, ""
+        if name in fitted.intervals:
+            low, high = (covariate.format(value) for value in fitted.intervals[name])
+            interval = f" ({low})" if low == high else f" ({low} to {high})"
+        print(f"{name}: {covariate.format(fitted.covariates[name])}{interval}")
+    for other in alternatives[1:]:
+        print(f"or, with a probability of {other['probability']:.0%}: {other['covariates']}")
+    low, high = fitted.volume_interval_cm3
+    print(f"volume: {fitted.volume_cm3:.1f} cm³ ({low:.1f} to {high:.1f})")
+    print(f"residual: {fitted.residual_mm:.2f} mm, {fitted.seconds:.1f} s")
+    for sentence in fitted.remarks:
+        print(sentence)
+
+
+def _tell_series(intake: Any, people: Sequence[Any], out: Path | None, json_file: Path | None) -> None:
+    from naisr_model.evaluation.evolution import write_series
+
+    with bar("measuring") as progress, stoppable() as stop:
+        records = write_series(out, people, progress=progress, should_stop=stop)
+    for person, record in zip(people, records, strict=True):
+        where = ", ".join(c.format(person.covariates[c.name]) for c in person.atlas.covariates)
+        low, high = record["volume_low_cm3"], record["volume_high_cm3"]
+        print(f"{where}: {record['volume_cm3']:.1f} cm³ ({low:.1f} to {high:.1f})")
+    write_json(json_file, {"patient": intake.to_json(), "shapes": records})
