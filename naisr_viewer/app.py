@@ -9,7 +9,6 @@ import sys
 import time
 from collections.abc import Mapping, Sequence
 from functools import partial
-from importlib.resources import as_file, files
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated
@@ -17,7 +16,9 @@ from typing import TYPE_CHECKING, Annotated
 import cyclopts
 from cyclopts import Parameter
 
-from naisr_viewer.engine import VERSION, Engine, InputError, load_atlas
+from naisr_model.errors import InputError
+from naisr_model.shipped import shipped_atlas
+from naisr_viewer.engine import VERSION, Engine, load_atlas
 
 if TYPE_CHECKING:
     from PySide6.QtWidgets import QApplication
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
 
 LOADED = time.monotonic()
 """When the program was loaded, where the system does not tell when it was started."""
-
-DEFAULT_ATLAS = "airway.safetensors"
 
 cli = cyclopts.App(
     name="naisr-viewer",
@@ -47,15 +46,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (InputError, cyclopts.CycloptsError) as error:
         print(f"naisr-viewer: {error}", file=sys.stderr)
         return 2
-
-
-def default_atlas() -> Path:
-    """The atlas that the program is shipped with, in a checkout or in an installation."""
-    beside = Path(__file__).parents[1] / "resources" / DEFAULT_ATLAS
-    if beside.is_file():
-        return beside
-    with as_file(files("naisr_viewer") / "_resources" / DEFAULT_ATLAS) as installed:
-        return installed
 
 
 @cli.default
@@ -94,7 +84,7 @@ def view(
     device
         Where exact surfaces are computed: cpu, cuda or mps.
     """
-    path = (atlas or default_atlas()).absolute()
+    path = (atlas or shipped_atlas()).absolute()
     pixels = parse_size(size)
     if not path.is_file():
         raise InputError(f"there is no file {path}; give the path of an atlas (.safetensors)")

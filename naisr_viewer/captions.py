@@ -1,13 +1,35 @@
-"""The line beneath each sub-plot, and what it means."""
+"""The line beneath each sub-plot, and hints on what it and its sub-plot mean."""
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 
 from naisr_viewer.requests import Colouring, SurfaceResult
 from naisr_viewer.state import ExplorerState, is_seen
+from naisr_viewer.words import gained, volume
+
+PANEL_HINTS = {
+    "template": "The shape from which all others are made.",
+    "effect": (
+        "The template moved by this covariate alone, all others at the population mean.\n"
+        "Displacements add up at a point; the surfaces shown here do not add up to the full shape."
+    ),
+    "shape": "The template moved by all covariates together.",
+    "scan": (
+        "The patient's scan, coloured by its distance to the full shape in mm:\n"
+        "orange where the scan lies outside the shape (+), blue where it lies inside (−)."
+    ),
+    "certainty": (
+        "The full shape, coloured by how far its surface may lie off in mm:\n"
+        "half of the 95 % interval of its place, inwards or outwards."
+    ),
+    "before": "The shape that changes are counted from.",
+    "change": (
+        "The full shape, coloured by how far it has moved since “before” in mm:\n"
+        "orange where it moved outwards (+), blue where it moved inwards (−)."
+    ),
+}
+"""What each kind of sub-plot is."""
 
 DOUBTFUL, DOUBTFUL_CHANGE = "preview uncertain", "correspondence uncertain"
 DOUBTFUL_HINT = (
@@ -34,8 +56,8 @@ CHANGE_HINT = (
     "positive where it has moved outwards."
 )
 
-
 LATER = "; away from the patient's own covariates the true doubt is larger"
+
 WORTH_TELLING = 0.05
 """Share of a surface beyond its colour scale from which on that is said."""
 
@@ -55,27 +77,6 @@ def caption(state: ExplorerState, result: SurfaceResult) -> tuple[str, str]:
     if is_seen(state.atlas.population, dict(result.request.values)):
         return text, hint
     return f"{text}<br>{UNSEEN}", UNSEEN_HINT
-
-
-def volume(cm3: float, margin_cm3: float | None = None) -> str:
-    """A volume with digits that mean something: ``48.3 cm³``, ``61.2 ± 7.0 cm³``, ``69,100 ± 5,900 cm³``.
-
-    Beside a margin it ends with the margin's second digit.
-    """
-    if not margin_cm3 or not math.isfinite(margin_cm3):
-        return f"{cm3:,.{0 if abs(cm3) >= 1000 else 1}f} cm³"
-    digits = 1 - math.floor(math.log10(margin_cm3))
-    places = max(0, digits)
-    return f"{round(cm3, digits):,.{places}f} ± {round(margin_cm3, digits):,.{places}f} cm³"
-
-
-def gained(cm3: float, before_cm3: float, margin_cm3: float | None = None) -> str:
-    """A difference of volumes: ``+12.7 cm³ (+26 %)``; with no more digits than the later volume has."""
-    difference, digits = cm3 - before_cm3, 0 if before_cm3 >= 1000 else 1
-    if margin_cm3:
-        digits = min(digits, 1 - math.floor(math.log10(margin_cm3)))
-    share = f" ({100 * difference / before_cm3:+.0f} %)" if before_cm3 else ""
-    return f"{round(difference, digits):+,.{max(0, digits)}f} cm³{share}".replace("-", "−")
 
 
 def _measured(result: SurfaceResult) -> tuple[str, str]:

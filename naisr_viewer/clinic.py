@@ -9,14 +9,15 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from naisr_viewer.engine import Engine, Progress, ShouldStop
+from naisr_viewer.engine import Engine
 from naisr_viewer.members import Member
 from naisr_viewer.patients import Fitted, Labels, Named, Reading, Scan
-from naisr_viewer.requests import EXACT_RESOLUTION, SurfaceRequest
+from naisr_viewer.requests import EXACT_RESOLUTION, Progress, ShouldStop, SurfaceRequest
 from naisr_viewer.state import FULL_SHAPE
 
 if TYPE_CHECKING:
     from naisr_model.evaluation.intake import Intake
+
 SHOWN_FACES = 20_000
 """A scan is thinned to so many for display and for its distances to a shape; the fit uses all of it."""
 

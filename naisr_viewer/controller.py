@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from enum import Enum, auto
 from pathlib import Path
 from types import MappingProxyType, TracebackType
 
 from PySide6.QtCore import QObject, QSettings, Qt, QTimer, Signal
 
-from naisr_viewer import export
+from naisr_model.errors import Cancelled, InputError
+from naisr_viewer import export, jobs
 from naisr_viewer.captions import caption
-from naisr_viewer.engine import VERSION, Cancelled, Engine, InputError
+from naisr_viewer.engine import VERSION, Engine
+from naisr_viewer.jobs import ExportReport
+from naisr_viewer.preferences import Preferences
 from naisr_viewer.requests import (
     EXACT_RESOLUTION,
     PREVIEW_RESOLUTION,
     ExportChoice,
-    Origin,
-    SurfaceRequest,
     SurfaceResult,
     answers,
+    missing,
     request_for,
 )
 from naisr_viewer.state import (
@@ -40,14 +42,14 @@ from naisr_viewer.state import (
     visible_panels,
     with_value,
 )
+from naisr_viewer.status import status_line
 from naisr_viewer.views.main_window import MainWindow
 from naisr_viewer.views.theme import ThemeChoice
+from naisr_viewer.words import in_words
 from naisr_viewer.worker import Job, Worker
 
 PATIENCE_MS = 1000
 """Work shorter than this shows no progress bar."""
-
-RECENT_FILES = 8
 
 
 class Task(Enum):
@@ -64,20 +66,6 @@ class Task(Enum):
 
 UNDIVIDED = (Task.OPENING, Task.EXPORT, Task.READING, Task.FITTING)
 """What the worker finishes, or is told to stop, before it computes surfaces again."""
-
-
-@dataclass(frozen=True)
-class ExportReport:
-    """An export that came to its end."""
-
-    count: int
-    choice: ExportChoice
-
-    @property
-    def sentence(self) -> str:
-        """What the status line says."""
-        surfaces = "1 surface" if self.count == 1 else f"{self.count} surfaces"
-        return f"Exported {surfaces} as {self.choice.format.upper()} to {self.choice.folder}"
 
 
 class Controller(QObject):
@@ -100,7 +88,7 @@ class Controller(QObject):
         super().__init__()
         self.state = ExplorerState()
         self.shown: dict[Panel, SurfaceResult] = {}
-        self._window, self._engine, self._settings = window, engine, settings
+        self._window, self._engine, self._preferences = window, engine, Preferences(settings)
         self._worker, self._background = worker, background
         self._history = History()
         self._before_move: ExplorerState | None = None
@@ -110,8 +98,8 @@ class Controller(QObject):
         self._preparing: tuple[Path, int] | None = None
         self._patience = QTimer(self, singleShot=True, interval=PATIENCE_MS)
         self._connect()
-        window.show_recent(self._recent())
-        window.show_theme(ThemeChoice(str(settings.value("theme", ThemeChoice.SYSTEM.value))))
+        window.show_recent(self._preferences.recent)
+        window.show_theme(self._preferences.theme)
         window.show_history(False, False)
 
     @property
@@ -131,16 +119,8 @@ class Controller(QObject):
 
     def open(self, path: Path) -> None:
         """Read an atlas beside the window and show it at its population mean."""
-
-        def job(
-            deliver: Callable[[object], None],
-            progress: Callable[[float], None],
-            should_stop: Callable[[], bool],
-        ) -> None:
-            deliver(self._engine.open(path.absolute()))
-
         self._window.show_opening(path.name)
-        self.run(Task.OPENING, f"Opening {path.name} …", job)
+        self.run(Task.OPENING, f"Opening {path.name} …", jobs.opening(self._engine, path.absolute()))
 
     def run(self, task: Task, status: str, job: Job) -> None:
         """Give the worker something else than surfaces to do; the covariates rest meanwhile."""
@@ -154,7 +134,8 @@ class Controller(QObject):
         self.shown = {}
         self._preparing = None
         self._leave()
-        self._remember(card.path)
+        self._preferences.remember(card.path)
+        self._window.show_recent(self._preferences.recent)
         state = opened(self.state, card)
         for name, value in values.items():
             state = with_value(state, name, value)
@@ -162,25 +143,9 @@ class Controller(QObject):
 
     def export(self, choice: ExportChoice) -> None:
         """Write surfaces at the present values; what is missing is computed first."""
-        atlas = self.state.atlas
-        if atlas is None:
-            return
-        state = self.state
-        requests = [request_for(state, panel, choice.resolution) for panel in choice.panels]
-        owners = [state.shown if request.person else None for request in requests]
-
-        def job(
-            deliver: Callable[[object], None],
-            progress: Callable[[float], None],
-            should_stop: Callable[[], bool],
-        ) -> None:
-            for place, (request, owner) in enumerate(zip(requests, owners, strict=True)):
-                result = self._engine.surface(request, _part(progress, place, len(requests)), should_stop)
-                path = choice.folder / f"{export.file_stem(atlas, result, owner)}.{choice.format}"
-                export.write_surface(path, result, atlas, owner)
-            deliver(ExportReport(len(requests), choice))
-
-        self.run(Task.EXPORT, f"Exporting into {choice.folder} …", job)
+        if self.state.atlas is not None:
+            job = jobs.exporting(self._engine, self.state, choice)
+            self.run(Task.EXPORT, f"Exporting into {choice.folder} …", job)
 
     def save_screenshot(self, path: Path) -> None:
         """Write a picture of the whole window; the ending of ``path`` says which kind."""
@@ -238,7 +203,7 @@ class Controller(QObject):
 
     def set_theme(self, choice: ThemeChoice) -> None:
         """Colour the window and remember it."""
-        self._settings.setValue("theme", choice.value)
+        self._preferences.set_theme(choice)
         self._window.show_theme(choice)
 
     def cancel(self) -> None:
@@ -324,68 +289,36 @@ class Controller(QObject):
                 del self.shown[panel]
                 self._window.shapes.clear_surface(panel)
 
-    def _missing(self, resolution: int) -> list[SurfaceRequest]:
-        """What is not on screen at ``resolution`` yet, the full shape first."""
-        wanted = [
-            request_for(self.state, panel, resolution) for panel in reversed(visible_panels(self.state))
-        ]
-        return [request for request in wanted if not answers(self.shown.get(request.panel), request)]
-
     def _refresh(self) -> None:
         """Show what is remembered and set the worker on what is missing."""
         if self._task in UNDIVIDED or self.state.atlas is None:
             return
         for resolution in (EXACT_RESOLUTION, PREVIEW_RESOLUTION):
-            for request in self._missing(resolution):
+            for request in missing(self.state, self.shown, resolution):
                 if (result := self._engine.cached(request)) is not None:
                     self._show(result)
-        coarse = self._missing(PREVIEW_RESOLUTION)
-        fine = [] if self.is_moving else self._missing(EXACT_RESOLUTION)
+        coarse = missing(self.state, self.shown, PREVIEW_RESOLUTION)
+        fine = [] if self.is_moving else missing(self.state, self.shown, EXACT_RESOLUTION)
         if self._task is Task.EXACT or not (coarse or fine):
             self._worker.cancel()
         if coarse:
-            self._start(Task.PREVIEW, self._frame_job(coarse))
+            self._start(Task.PREVIEW, jobs.frame(self._engine, coarse))
         elif fine:
-            self._start(Task.EXACT, self._surfaces_job(fine))
+            self._start(Task.EXACT, jobs.one_by_one(self._engine, fine))
         self._show_status()
-
-    def _frame_job(self, requests: list[SurfaceRequest]) -> Job:
-        """All surfaces of one moment, handed over together so that they are painted together."""
-        surface = self._engine.surface
-        return lambda deliver, _, should_stop: deliver(
-            tuple(surface(request, None, should_stop) for request in requests)
-        )
-
-    def _surfaces_job(self, requests: list[SurfaceRequest]) -> Job:
-        """Surfaces that are handed over one by one, because each takes a while."""
-        engine = self._engine
-
-        def job(
-            deliver: Callable[[object], None],
-            progress: Callable[[float], None],
-            should_stop: Callable[[], bool],
-        ) -> None:
-            for place, request in enumerate(requests):
-                deliver((engine.surface(request, _part(progress, place, len(requests)), should_stop),))
-
-        return job
 
     def _prepare_previews(self) -> None:
         """Make previews of the open atlas fast, once everything that somebody waits for is done."""
-        atlas, person, engine = self.state.atlas, self.state.person, self._engine
+        atlas, person = self.state.atlas, self.state.person
         if atlas is None or self.is_busy or not self._window.shapes.is_ready:
             return
         if self._preparing == (atlas.path, person):
             return
         self._preparing = (atlas.path, person)
-        if engine.has_previews(atlas.path, person):
+        if self._engine.has_previews(atlas.path, person):
             return
         self._background.cancel()
-        self._background.submit(
-            lambda _, progress, should_stop: engine.prepare_previews(
-                atlas.path, person, progress, should_stop
-            )
-        )
+        self._background.submit(jobs.preparing(self._engine, atlas.path, person))
 
     def _start(self, task: Task, job: Job) -> None:
         if task in UNDIVIDED:
@@ -458,58 +391,12 @@ class Controller(QObject):
             self._prepare_previews()
 
     def _show_status(self) -> None:
-        self._window.show_status(self._status())
-
-    def _status(self) -> str:
-        shown = [self.shown[panel] for panel in visible_panels(self.state) if panel in self.shown]
-        if self.state.atlas is None or not shown:
-            return self._halted or ("Opening …" if self.is_busy else "No atlas open")
-        exact = [result for result in shown if result.is_exact]
-        coarse = [result for result in shown if not result.is_exact]
-        behind = f"{len(self._missing(0))} of {len(visible_panels(self.state))} views"
-        if self._missing(0) and self._halted:
-            return f"{self._halted} · {behind} show earlier values"
-        if self._missing(0) and not coarse:
-            return f"Updating {behind} …"
-        text = _in_short(coarse or exact)
-        if self._task is Task.EXACT:
-            text += f" · refining to {EXACT_RESOLUTION}³, {len(exact)} of {len(shown)} views done"
-        return " · ".join(filter(None, (text, self._halted, self._notice)))
-
-    def _recent(self) -> list[Path]:
-        stored = self._settings.value("recent", [])
-        names = [stored] if isinstance(stored, str) else list(stored or [])  # type: ignore[call-overload]
-        return [Path(name) for name in names if Path(name).is_file()]
-
-    def _remember(self, path: Path) -> None:
-        recent = [path, *(other for other in self._recent() if other != path)][:RECENT_FILES]
-        self._settings.setValue("recent", [str(each) for each in recent])
-        self._window.show_recent(recent)
-
-
-def _in_short(results: list[SurfaceResult]) -> str:
-    """What these surfaces are, how long they took, and how far off their previews were."""
-    seconds = sum({id(result.points_mm): result.seconds for result in results}.values())
-    if results[0].origin is Origin.TABLES:
-        return f"Preview in {1000 * seconds:.0f} ms"
-    size = results[0].request.resolution
-    text = f"{'Exact' if results[0].is_exact else 'Preview'} {size}³ in {seconds:.2g} s"
-    errors = [result.preview_error_mm for result in results if result.preview_error_mm is not None]
-    return f"{text} · 99 % of the preview was within {max(0.01, *errors):.2f} mm" if errors else text
-
-
-def in_words(error: BaseException) -> str:
-    """An error as the user reads it."""
-    if isinstance(error, InputError):
-        text = str(error)
-        first = text.split(" ", 1)[0]
-        start = text[:1].upper() if first.isalpha() else text[:1]
-        return start + text[1:] + ("" if text.endswith(".") else ".")
-    return (
-        f"Something unexpected went wrong ({type(error).__name__}: {error}). What is on screen is unchanged."
-    )
-
-
-def _part(progress: Callable[[float], None], place: int, count: int) -> Callable[[float], None]:
-    """Progress of one piece as progress of the whole."""
-    return lambda fraction: progress((place + fraction) / count)
+        text = status_line(
+            self.state,
+            self.shown,
+            is_busy=self.is_busy,
+            is_refining=self._task is Task.EXACT,
+            halted=self._halted,
+            notice=self._notice,
+        )
+        self._window.show_status(text)

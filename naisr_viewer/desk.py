@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
@@ -13,8 +12,10 @@ from PySide6.QtCore import QFileSystemWatcher, QObject
 from naisr_viewer.clinic import Clinic
 from naisr_viewer.controller import Controller, Task
 from naisr_viewer.patients import Fitted, Labels, Named, Patient, Reading, Scan
+from naisr_viewer.requests import Progress, ShouldStop
 from naisr_viewer.state import Layout, label, showing, with_patient, without_patient
 from naisr_viewer.views.main_window import MainWindow
+from naisr_viewer.worker import Deliver
 
 Stamp = tuple[int, int] | None
 """When a file was written (ns) and its size; None where there is none."""
@@ -128,11 +129,7 @@ class PatientDesk(QObject):
         if atlas is None or patient is None or self._is_refused(known):
             return
 
-        def job(
-            deliver: Callable[[object], None],
-            progress: Callable[[float], None],
-            should_stop: Callable[[], bool],
-        ) -> None:
+        def job(deliver: Deliver, progress: Progress, should_stop: ShouldStop) -> None:
             fit = clinic.fit(atlas.path, patient.scan, known, progress, should_stop)
             deliver(Found(patient.key, patient.scan, known, fit))
 
@@ -172,11 +169,7 @@ class PatientDesk(QObject):
             return
         order = self._waiting.popleft()
 
-        def job(
-            deliver: Callable[[object], None],
-            progress: Callable[[float], None],
-            should_stop: Callable[[], bool],
-        ) -> None:
+        def job(deliver: Deliver, progress: Progress, should_stop: ShouldStop) -> None:
             stamp = stamp_of(order.reading.path)
             labels = clinic.labels(order.reading)
             found = labels or clinic.read(atlas.path, order.reading, order.known, should_stop)

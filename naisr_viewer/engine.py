@@ -1,4 +1,4 @@
-"""Requests to results: the one place where the viewer meets the model. Knows no Qt."""
+"""Requests to results: asks the atlases that are open, and remembers their answers. Knows no Qt."""
 
 from __future__ import annotations
 
@@ -15,42 +15,43 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from naisr_model import __version__ as VERSION
+from naisr_model import __version__
 from naisr_model.errors import Cancelled, InputError
 from naisr_model.files import replacing
-from naisr_viewer import cache, members
+from naisr_viewer import cache, members, surfaces
 from naisr_viewer.members import Member
-from naisr_viewer.patients import Named
-from naisr_viewer.requests import EXACT_RESOLUTION, Origin, SurfaceRequest, SurfaceResult
-from naisr_viewer.state import FULL_SHAPE, TEMPLATE, AtlasCard, Panel
+from naisr_viewer.previews import Previews
+from naisr_viewer.requests import (
+    EXACT_RESOLUTION,
+    SIGNED,
+    Origin,
+    Progress,
+    ShouldStop,
+    SurfaceRequest,
+    SurfaceResult,
+    simplest,
+    template_request,
+)
+from naisr_viewer.state import FULL_SHAPE, TEMPLATE, AtlasCard
 
 if TYPE_CHECKING:
     import trimesh
 
     from naisr_model.atlas import Atlas
-    from naisr_model.covariates import Covariate
     from naisr_model.surface.displacements import DisplacementTables
     from naisr_model.surface.tracking import Tracked, Tracker
 
-__all__ = ["VERSION", "Cancelled", "Engine", "InputError", "load_atlas"]
+VERSION = __version__
+"""Of the program, for those who may not ask the model."""
 
 CACHED_SURFACES = 96
 """How many surfaces are kept; an exact one takes about 3 MB."""
 
-KEPT_TRACKERS = 4
-"""How many persons' previews stay fast; each takes about 20 MB."""
-
 POLL_S = 0.05
 """Between two looks at ``should_stop`` while another thread prepares previews."""
 
-COLOURED = ("scan", "certainty", "change")
-"""Panels of a patient with numbers on their surface."""
-
 OPEN_ATLASES = 2
 """How many atlases are kept open, so that going back to the last one is instant."""
-
-Progress = Callable[[float], None]
-ShouldStop = Callable[[], bool]
 
 
 def load_atlas(path: Path, device: str = "cpu") -> Atlas:
@@ -96,10 +97,7 @@ class Engine:
         self._members: dict[int, Member] = {}
         self._persons = count(1)
         self._preparing = Lock()
-        self._trackers: OrderedDict[tuple[Path, int], Tracker] = OrderedDict()
-        self._tracked: dict[tuple[Path, int, Panel], Tracked] = {}
-        self._before: tuple[Path, int, Named, Tracked] | None = None  # what changes were last counted from
-        self._preview: SurfaceResult | None = None  # the last one; sub-plots may show the same surface
+        self._previews = Previews()
         self._results: OrderedDict[SurfaceRequest, SurfaceResult] = OrderedDict()
 
     def open(self, path: Path) -> AtlasCard:
@@ -112,7 +110,7 @@ class Engine:
             raise InputError(f"there is no file {path}; give the path of an atlas (.safetensors)")
         fingerprint = cache.fingerprint(path)
         with contextlib.suppress(InputError):
-            kept = cache.read_opening(self._file(fingerprint, cache.OPENING), _template(path))
+            kept = cache.read_opening(self._file(fingerprint, cache.OPENING), template_request(path))
             self._begin(Opened(kept.card, fingerprint, was_kept=True), None, kept.template)
             return kept.card
         atlas = self._load(path)
@@ -150,11 +148,7 @@ class Engine:
 
     def _forget_surfaces(self, is_meant: Callable[[Path, int], bool]) -> None:
         """Of these persons, by atlas and number."""
-        self._preview = self._before = None
-        for key in [key for key in self._trackers if is_meant(*key)]:
-            del self._trackers[key]
-        for panel_key in [key for key in self._tracked if is_meant(*key[:2])]:
-            del self._tracked[panel_key]
+        self._previews.forget(is_meant)
         for stale in [each for each in self._results if is_meant(each.atlas, each.person)]:
             del self._results[stale]
 
@@ -217,7 +211,7 @@ class Engine:
         import trimesh
 
         opened, member, _ = self._who(path, person)
-        atlas, shown = self.atlas(path), self.surface(_template(path), None, should_stop)
+        atlas, shown = self.atlas(path), self.surface(template_request(path), None, should_stop)
         if not len(shown.faces):
             return
         if not opened.was_kept:
@@ -231,13 +225,11 @@ class Engine:
         tracker = atlas.tracker(template, tables)
         with self._lock:
             if self._opened.get(path) is opened and (not person or person in self._members):
-                self._trackers[path, person] = tracker
-            while len(self._trackers) > KEPT_TRACKERS:
-                self._trackers.popitem(last=False)
+                self._previews.keep(path, person, tracker)
 
     def has_previews(self, path: Path, person: int = 0) -> bool:
         """Whether :meth:`prepare_previews` is done for a person."""
-        return (path, person) in self._trackers
+        return self._previews.tracker(path, person) is not None
 
     def _who(self, path: Path, person: int) -> tuple[Opened, Member | None, Tracker | None]:
         """Whom a request is about; nobody asks any more for an atlas or a person that is not there."""
@@ -245,7 +237,7 @@ class Engine:
             opened, member = self._opened.get(path), self._members.get(person)
             if opened is None or (person and member is None):
                 raise Cancelled
-            return opened, member, self._trackers.get((path, person))
+            return opened, member, self._previews.tracker(path, person)
 
     def _keep_opening(self, opened: Opened, template: SurfaceResult) -> None:
         file = self._file(opened.fingerprint, cache.OPENING)
@@ -299,28 +291,24 @@ class Engine:
         """
         if (remembered := self.cached(request)) is not None:
             return remembered
-        if request.panel.kind in COLOURED:
+        if request.panel.kind in SIGNED:
             return self._coloured(request, progress, should_stop)
         opened, member, tracker = self._who(request.atlas, request.person)
         question = simplest(request, opened.card.covariates)
         if tracker is not None and request.resolution < EXACT_RESOLUTION:
-            start, preview = time.perf_counter(), self._preview
-            if preview is None or preview.request != question:
-                preview = _tracked_result(question, tracker, self._track(request, tracker), start)
-                self._preview = preview
-            return replace(preview, request=request)
+            return replace(self._previews.surface(request, question, tracker), request=request)
         atlas = self.atlas(request.atlas)
         start = time.perf_counter()
         latent = None if member is None else member.fit.latent
-        mesh = _mesh(atlas, question, latent, tracker, progress, should_stop)
+        mesh = surfaces.mesh(atlas, question, latent, tracker, progress, should_stop)
         if should_stop is not None and should_stop():
             raise Cancelled
-        result = _result(question, mesh, start)
+        result = surfaces.from_mesh(question, mesh, start)
         if member is not None and question.person and result.is_exact:
-            margin_cm3 = members.margin_cm3(member, question.values, mesh)
+            margin_cm3 = member.at(question.values).volume_margin_cm3(mesh)
             result = replace(result, volume_margin_cm3=margin_cm3)
         if tracker is not None and len(result.faces):
-            error_mm = _deviation_mm(self._track(request, tracker).points_mm, result)
+            error_mm = surfaces.deviation_mm(self._previews.track(request, tracker).points_mm, result)
             result = replace(result, preview_error_mm=error_mm)
         self._remember(opened, question, result)
         return replace(result, request=request)
@@ -341,11 +329,11 @@ class Engine:
         opened, member, _ = self._who(request.atlas, request.person)
         assert member is not None
         if request.panel.kind == "scan":
-            result = _scanned(request, member)
+            result = surfaces.from_scan(request, member)
         else:
             shape = self.surface(replace(request, panel=FULL_SHAPE, before=None), progress, should_stop)
             if request.panel.kind == "certainty":
-                result = _with_certainty(replace(shape, request=request), member)
+                result = surfaces.with_certainty(replace(shape, request=request), member)
             else:
                 result = self._changed(replace(shape, request=request), member, progress, should_stop)
         if result.is_exact:
@@ -370,12 +358,12 @@ class Engine:
         (_, _, tracker), (_, _, earlier) = self._who(path, request.person), self._who(path, person)
         if tracker is None or earlier is None:
             return shape
-        first = later = self._tracked_before(path, person, values, earlier)
+        first = later = self._previews.track_before(path, person, values, earlier)
         before_mm = first.points_mm
         if shape.origin is Origin.NETWORK:
-            later = self._track(request, tracker)
+            later = self._previews.track(request, tracker)
             moved_mm = first.points_mm - later.points_mm
-            before_mm = shape.points_mm + _nearest(later.points_mm, moved_mm, shape.points_mm)
+            before_mm = shape.points_mm + surfaces.at_nearest(later.points_mm, moved_mm, shape.points_mm)
         return replace(
             shape,
             colouring=members.change(member, before_mm, shape.points_mm, shape.normals),
@@ -383,33 +371,14 @@ class Engine:
             doubtful=shape.doubtful or not (first.is_trustworthy and later.is_trustworthy),
         )
 
-    def _tracked_before(self, path: Path, person: int, values: Named, tracker: Tracker) -> Tracked:
-        kept = self._before
-        if kept is not None and kept[:3] == (path, person, values):
-            return kept[3]
-        tracked = tracker.track(dict(values))
-        self._before = (path, person, values, tracked)
-        return tracked
-
     def _volume_before_cm3(self, request: SurfaceRequest, first: Tracked, faces: NDArray[np.int64]) -> float:
         """Of the same kind as the later volume: both exact, or both of previews."""
-        from naisr_model.surface.volume import enclosed_volume
-
         assert request.before is not None
         if request.resolution < EXACT_RESOLUTION:
-            return enclosed_volume(first.points_mm, first.normals, faces) / 1000
+            return surfaces.volume_cm3(first.points_mm, first.normals, faces)
         person, values = request.before
         before = replace(request, panel=FULL_SHAPE, person=person, values=values, before=None)
         return self.surface(before).volume_cm3
-
-    def _track(self, request: SurfaceRequest, tracker: Tracker) -> Tracked:
-        """Carry the template, beginning where the panel's last preview ended."""
-        key = (request.atlas, request.person, request.panel)
-        tracked = tracker.track(dict(request.values), self._tracked.get(key))
-        if tracked.is_trustworthy:
-            with self._lock:
-                self._tracked[key] = tracked
-        return tracked
 
 
 @contextlib.contextmanager
@@ -424,122 +393,3 @@ def _held(lock: Lock, should_stop: ShouldStop | None) -> Iterator[None]:
         yield
     finally:
         lock.release()
-
-
-def _template(path: Path) -> SurfaceRequest:
-    return SurfaceRequest(path, TEMPLATE, (), EXACT_RESOLUTION)
-
-
-def simplest(request: SurfaceRequest, covariates: tuple[Covariate, ...]) -> SurfaceRequest:
-    """The request with the fewest covariates that has the same surface as ``request``.
-
-    g_i vanishes where covariate i is at its centre, so Phi with a single covariate off its centre is
-    that covariate's Phi_i, and with none it is the template T, whoever it is.
-    """
-    if request.panel.kind in COLOURED:
-        return request
-    centre = {covariate.name: covariate.centre for covariate in covariates}
-    moved = tuple((name, value) for name, value in request.values if value != centre[name])
-    if len(moved) > 1:
-        return replace(request, panel=FULL_SHAPE, values=moved)
-    if moved:
-        return replace(request, panel=Panel("effect", moved[0][0]), values=moved)
-    return replace(request, panel=TEMPLATE, values=(), person=0)
-
-
-def _mesh(
-    atlas: Atlas,
-    request: SurfaceRequest,
-    latent: NDArray[np.float64] | None,
-    tracker: Tracker | None,
-    progress: Progress | None,
-    should_stop: ShouldStop | None,
-) -> trimesh.Trimesh:
-    panel, size = request.panel, request.resolution
-    if panel.kind == "template":
-        return atlas.template(size, progress=progress, should_stop=should_stop)
-    if panel.kind == "effect":
-        ((name, value),) = request.values
-        return atlas.effect(
-            name, value, latent, size, tracker=tracker, progress=progress, should_stop=should_stop
-        )
-    return atlas.shape(
-        dict(request.values), latent, size, tracker=tracker, progress=progress, should_stop=should_stop
-    )
-
-
-def _scanned(request: SurfaceRequest, member: Member) -> SurfaceResult:
-    """The scan, at rest with its distance to the shape."""
-    start, is_exact = time.perf_counter(), request.resolution >= EXACT_RESOLUTION
-    colouring = members.distances(member, request.values) if is_exact else None
-    scan = member.scan
-    return SurfaceResult(
-        request=request,
-        points_mm=scan.points_mm,
-        normals=scan.normals,
-        faces=scan.faces,
-        volume_cm3=scan.volume_cm3 or 0.0,
-        seconds=time.perf_counter() - start,
-        origin=Origin.NETWORK,
-        colouring=colouring,
-    )
-
-
-def _with_certainty(shape: SurfaceResult, member: Member) -> SurfaceResult:
-    if not shape.is_exact or not len(shape.faces):
-        return shape
-    return replace(shape, colouring=members.certainty(member, shape.request.values, shape.points_mm))
-
-
-def _nearest(
-    places: NDArray[np.float32], values: NDArray[np.float32], points: NDArray[np.float32]
-) -> NDArray[np.float32]:
-    """The value at the nearest of ``places [n, 3]`` for each of ``points [m, 3]``."""
-    from scipy.spatial import cKDTree
-
-    result: NDArray[np.float32] = values[cKDTree(places).query(points)[1]]
-    return result
-
-
-def _tracked_result(
-    request: SurfaceRequest, tracker: Tracker, tracked: Tracked, start: float
-) -> SurfaceResult:
-    from naisr_model.surface.volume import enclosed_volume
-
-    return SurfaceResult(
-        request=request,
-        points_mm=tracked.points_mm,
-        normals=tracked.normals,
-        faces=tracker.faces,
-        volume_cm3=enclosed_volume(tracked.points_mm, tracked.normals, tracker.faces) / 1000.0,
-        seconds=time.perf_counter() - start,
-        origin=Origin.TABLES,
-        doubtful=not tracked.is_trustworthy,
-    )
-
-
-def _deviation_mm(points_mm: NDArray[np.float32], exact: SurfaceResult) -> float:
-    """Distance to the exact surface that 99 % of the points keep, along the normal of the nearest vertex."""
-    from scipy.spatial import cKDTree
-
-    nearest = cKDTree(exact.points_mm).query(points_mm)[1]
-    offsets = points_mm - exact.points_mm[nearest]
-    return float(np.quantile(np.abs(np.sum(offsets * exact.normals[nearest], axis=1)), 0.99))
-
-
-def _result(request: SurfaceRequest, mesh: trimesh.Trimesh, start: float) -> SurfaceResult:
-    from naisr_model.surface.volume import enclosed_volume
-
-    empty = len(mesh.faces) == 0
-    points_mm = np.zeros((0, 3)) if empty else np.asarray(mesh.vertices)
-    normals = np.zeros((0, 3)) if empty else np.asarray(mesh.vertex_normals)
-    faces = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
-    return SurfaceResult(
-        request=request,
-        points_mm=points_mm.astype(np.float32),
-        normals=normals.astype(np.float32),
-        faces=faces,
-        volume_cm3=enclosed_volume(points_mm, normals, faces) / 1000.0,
-        seconds=time.perf_counter() - start,
-        origin=Origin.NETWORK,
-    )

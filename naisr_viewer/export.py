@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from naisr_viewer.engine import VERSION, InputError
+from naisr_model.errors import InputError
+from naisr_model.files import replacing
+from naisr_viewer.engine import VERSION
 from naisr_viewer.patients import Patient
 from naisr_viewer.requests import FORMATS, SurfaceResult
 from naisr_viewer.state import AtlasCard, Covariate, panel_title
@@ -24,19 +24,10 @@ def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
         InputError: when the folder cannot be written to.
     """
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
-    except OSError as error:
-        raise InputError(f"cannot write {path}: {error.strerror}; choose another folder") from error
-    os.close(handle)
-    try:
-        write(Path(name))
-        os.chmod(name, 0o644)
-        os.replace(name, path)
+        with replacing(path) as temporary:
+            write(temporary)
     except OSError as error:
         raise InputError(f"cannot write {path}: {error.strerror or error}; choose another folder") from error
-    finally:
-        Path(name).unlink(missing_ok=True)
 
 
 def write_surface(

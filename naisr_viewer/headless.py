@@ -6,16 +6,17 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import QCoreApplication, QEventLoop, QPoint, Qt
+from PySide6.QtCore import QCoreApplication, QEventLoop, Qt
 from PySide6.QtTest import QTest
 
+from naisr_model.errors import InputError
 from naisr_viewer import export
 from naisr_viewer.controller import Controller
-from naisr_viewer.engine import InputError
 from naisr_viewer.requests import EXACT_RESOLUTION, ExportChoice
 from naisr_viewer.state import FULL_SHAPE, Layout, all_panels
-from naisr_viewer.views.covariate_panel import HANDLE_PX, SLIDER_STEPS, CovariateRow
+from naisr_viewer.views.covariate_panel import CovariateRow
 from naisr_viewer.views.main_window import MainWindow
+from naisr_viewer.views.slider import SLIDER_STEPS
 
 DEADLINE_S = 600.0
 """Nothing on screen takes longer than this, even on a slow machine."""
@@ -64,18 +65,12 @@ def take_screenshot(window: MainWindow, controller: Controller, path: Path) -> N
 
 def drag(row: CovariateRow, start: float, end: float) -> None:
     """Drag a slider between two shares of its range with the mouse, letting the window follow."""
-    slider = row.slider
-    middle = slider.height() // 2
-    usable = slider.width() - HANDLE_PX
-
-    def place(share: float) -> QPoint:
-        return QPoint(round(HANDLE_PX / 2 + share * usable), middle)
-
-    QTest.mousePress(slider, Qt.MouseButton.LeftButton, pos=place(start))
+    slider, left = row.slider, Qt.MouseButton.LeftButton
+    QTest.mousePress(slider, left, pos=slider.place_of(start))
     for step in range(1, DRAG_STEPS + 1):
-        QTest.mouseMove(slider, place(start + (end - start) * step / DRAG_STEPS))
+        QTest.mouseMove(slider, slider.place_of(start + (end - start) * step / DRAG_STEPS))
         pause(FRAME_S)
-    QTest.mouseRelease(slider, Qt.MouseButton.LeftButton, pos=place(end))
+    QTest.mouseRelease(slider, left, pos=slider.place_of(end))
 
 
 def run_demo(window: MainWindow, controller: Controller, folder: Path) -> None:

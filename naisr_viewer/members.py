@@ -14,8 +14,6 @@ from naisr_viewer.patients import Named, Scan
 from naisr_viewer.requests import Colouring
 
 if TYPE_CHECKING:
-    import trimesh
-
     from naisr_model.atlas import Fit, Individual
 
 DISTANCE_SHARE, CERTAINTY_SHARE, CHANGE_SHARE = 0.02, 0.015, 0.08
@@ -81,11 +79,6 @@ def change(
     moved_mm = np.sum((after_mm - before_mm) * normals, axis=1)
     limit_mm = rounded(CHANGE_SHARE * member.fit.individual.atlas.frame.scale_mm)
     return Colouring(moved_mm.astype(np.float32), limit_mm, is_signed=True)
-
-
-def margin_cm3(member: Member, values: Named, mesh: trimesh.Trimesh) -> float:
-    """Half of the 95 % interval of the volume of the person's shape at ``values``, given its mesh."""
-    return member.at(values).volume_margin_cm3(mesh)
 
 
 def rounded(length: float) -> float:

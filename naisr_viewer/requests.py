@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from enum import Enum, auto
 from pathlib import Path
@@ -10,7 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from naisr_viewer.patients import Named
-from naisr_viewer.state import ExplorerState, Panel, panel_values
+from naisr_viewer.state import (
+    FULL_SHAPE,
+    TEMPLATE,
+    Covariate,
+    ExplorerState,
+    Panel,
+    panel_values,
+    visible_panels,
+)
 
 PREVIEW_RESOLUTION = 40
 """Cells along a side of the box while a slider moves and displacements are not tabulated yet."""
@@ -20,6 +29,15 @@ EXACT_RESOLUTION = 128
 
 FORMATS = ("stl", "ply", "obj", "vtp", "glb")
 """Mesh files that can be written."""
+
+SIGNED = {"scan": True, "certainty": False, "change": True}
+"""Kinds of panels with numbers on their surface, and whether the scale of these has two sides."""
+
+Progress = Callable[[float], None]
+"""Told now and then which share of the work is done, 0 to 1."""
+
+ShouldStop = Callable[[], bool]
+"""Asked now and then whether nobody waits for the work any more."""
 
 
 class Origin(Enum):
@@ -118,11 +136,41 @@ def request_for(state: ExplorerState, panel: Panel, resolution: int) -> SurfaceR
     return SurfaceRequest(state.atlas.path, panel, values, resolution, person, before)
 
 
+def template_request(atlas: Path) -> SurfaceRequest:
+    """The exact template, which all previews are made of."""
+    return SurfaceRequest(atlas, TEMPLATE, (), EXACT_RESOLUTION)
+
+
+def simplest(request: SurfaceRequest, covariates: tuple[Covariate, ...]) -> SurfaceRequest:
+    """The request with the fewest covariates that has the same surface as ``request``.
+
+    g_i vanishes where covariate i is at its centre, so Phi with a single covariate off its centre is
+    that covariate's Phi_i, and with none it is the template T, whoever it is.
+    """
+    if request.panel.kind in SIGNED:
+        return request
+    centre = {covariate.name: covariate.centre for covariate in covariates}
+    moved = tuple((name, value) for name, value in request.values if value != centre[name])
+    if len(moved) > 1:
+        return replace(request, panel=FULL_SHAPE, values=moved)
+    if moved:
+        return replace(request, panel=Panel("effect", moved[0][0]), values=moved)
+    return replace(request, panel=TEMPLATE, values=(), person=0)
+
+
 def answers(result: SurfaceResult | None, request: SurfaceRequest) -> bool:
     """Whether ``result`` shows what ``request`` asks for, at least as finely."""
     if result is None or result.request.resolution < request.resolution:
         return False
     return replace(result.request, resolution=request.resolution) == request
+
+
+def missing(
+    state: ExplorerState, shown: Mapping[Panel, SurfaceResult], resolution: int
+) -> list[SurfaceRequest]:
+    """What ``state`` wants at ``resolution`` and is not among ``shown`` yet, the full shape first."""
+    wanted = [request_for(state, panel, resolution) for panel in reversed(visible_panels(state))]
+    return [request for request in wanted if not answers(shown.get(request.panel), request)]
 
 
 @dataclass(frozen=True)

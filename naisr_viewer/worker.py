@@ -11,24 +11,20 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from threading import Condition, Thread
-from typing import Any, Protocol
+from typing import Any
 
 from PySide6.QtCore import QObject, QTimer, Signal, Slot
+
+from naisr_viewer.requests import Progress, ShouldStop
 
 REPORT_INTERVAL_S = 0.05
 """Progress reports closer together than this are left out."""
 
+Deliver = Callable[[object], None]
+"""Hands a result over to the window's thread."""
 
-class Job(Protocol):
-    """Work to be done off the window's thread."""
-
-    def __call__(
-        self,
-        deliver: Callable[[object], None],
-        progress: Callable[[float], None],
-        should_stop: Callable[[], bool],
-    ) -> None:
-        """Do it: hand over results with ``deliver`` and poll ``should_stop``."""
+Job = Callable[[Deliver, Progress, ShouldStop], None]
+"""Work to be done off the window's thread."""
 
 
 class Worker(QObject):
@@ -117,7 +113,7 @@ class Worker(QObject):
         self._running = False
         self._reported.emit(generation, "idle", None)
 
-    def _thinned(self, generation: int) -> Callable[[float], None]:
+    def _thinned(self, generation: int) -> Progress:
         last = time.monotonic()
 
         def report(fraction: float) -> None:

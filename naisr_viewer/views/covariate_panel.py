@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QPointF, QRectF, QSignalBlocker, QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtCore import QSignalBlocker, Qt, QTimer, Signal
 from PySide6.QtWidgets import (
     QCheckBox,
-    QDoubleSpinBox,
     QFrame,
     QGridLayout,
     QHBoxLayout,
     QLabel,
     QPushButton,
     QScrollArea,
-    QSizePolicy,
-    QSlider,
     QToolButton,
     QVBoxLayout,
     QWidget,
@@ -26,21 +20,11 @@ from PySide6.QtWidgets import (
 
 from naisr_model.covariates import Covariate
 from naisr_viewer.state import AtlasCard, ExplorerState, label
+from naisr_viewer.views.histogram import Histogram
+from naisr_viewer.views.slider import JumpSlider, slider_position, slider_value
 from naisr_viewer.views.theme import Theme, covariate_colour
-
-SLIDER_STEPS = 1000
-"""Positions of a slider; a key press moves ten of them."""
-
-HANDLE_PX = 16
-"""Diameter of the slider handle; the histogram leaves half of it free on both sides."""
-
-BINS = 28
-
-MARK_PX = 10
-"""Width and height of the triangle at the patient's value."""
-
-BAND_PX = 3.0
-"""Height of the band beneath the bars that tells the patient's interval."""
+from naisr_viewer.views.value_inputs import LevelButton, ValueBox, level_buttons
+from naisr_viewer.words import mean_reading, reading
 
 SETTLE_MS = 400
 """Keys and wheel count as one movement until they pause this long."""
@@ -51,193 +35,6 @@ FOLLOW_HINT = (
     "Moving one covariate takes the other continuous ones along the population's growth path,\n"
     "keeping this person's own distance from it."
 )
-
-
-def slider_position(covariate: Covariate, value: float) -> int:
-    """The slider position nearest to a real value."""
-    low, high = covariate.range
-    share = (value - low) / (high - low) if high > low else 0.0
-    return round(min(max(share, 0.0), 1.0) * SLIDER_STEPS)
-
-
-def slider_value(covariate: Covariate, position: int) -> float:
-    """The real value at a slider position."""
-    low, high = covariate.range
-    return low + (high - low) * position / SLIDER_STEPS
-
-
-def decimals(covariate: Covariate) -> int:
-    """Digits after the point that tell about a thousand steps of the range apart."""
-    low, high = covariate.range
-    return max(0, min(6, 2 - math.floor(math.log10(max(high - low, 1e-6)))))
-
-
-def reading(covariate: Covariate, value: float) -> str:
-    """The value with its unit and as many digits as its number box has: ``84 months``, ``M``."""
-    if covariate.kind == "binary":
-        return covariate.format(round(value, 2))
-    return f"{value:.{decimals(covariate)}f} {covariate.unit}".rstrip()
-
-
-def patient_reading(covariate: Covariate, value: float, interval: tuple[float, float] | None) -> str:
-    """The patient's value in words: ``patient 21.3 kg, 95 %: 18.2 to 24.9``."""
-    text = f"patient {reading(covariate, value)}"
-    if interval is None:
-        return text
-    digits = 2 if covariate.kind == "binary" else decimals(covariate)
-    low, high = (f"{end:.{digits}f}".replace("-", "−") for end in interval)
-    return f"{text}, 95 %: {low} to {high}"
-
-
-def mean_reading(covariate: Covariate) -> str:
-    """The population mean in words; halfway between the levels of a binary covariate."""
-    return "in the middle" if covariate.kind == "binary" else reading(covariate, covariate.centre)
-
-
-def bin_counts(covariate: Covariate, observed: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How many subjects fall into each bin of the range, ``[n]`` bins; two of them for a binary one."""
-    low, high = covariate.range
-    bins = 2 if covariate.kind == "binary" else BINS
-    return np.histogram(observed, bins=bins, range=(low, max(high, low + 1e-9)))[0].astype(float)
-
-
-class JumpSlider(QSlider):
-    """A slider whose handle comes to where it is pressed, and can be dragged on from there."""
-
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(Qt.Orientation.Horizontal, parent)
-        self.setRange(0, SLIDER_STEPS)
-        self.setSingleStep(SLIDER_STEPS // 100)
-        self.setPageStep(SLIDER_STEPS // 10)
-
-    def position_at(self, x: float) -> int:
-        """The slider position under a horizontal pixel coordinate."""
-        usable = max(1.0, self.width() - HANDLE_PX)
-        return round(min(max((x - HANDLE_PX / 2) / usable, 0.0), 1.0) * SLIDER_STEPS)
-
-    def handle_x(self) -> float:
-        """The horizontal pixel coordinate of the handle's centre."""
-        return HANDLE_PX / 2 + self.sliderPosition() / SLIDER_STEPS * (self.width() - HANDLE_PX)
-
-    def mousePressEvent(self, event: QMouseEvent) -> None:
-        """Start dragging from the pressed place."""
-        if event.button() != Qt.MouseButton.LeftButton:
-            return
-        self.setSliderDown(True)
-        self.setSliderPosition(self.position_at(event.position().x()))
-
-    def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        """Follow the pointer."""
-        if self.isSliderDown():
-            self.setSliderPosition(self.position_at(event.position().x()))
-
-    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        """End the drag."""
-        if event.button() == Qt.MouseButton.LeftButton:
-            self.setSliderDown(False)
-
-    def set_colours(self, theme: Theme, colour: str) -> None:
-        """Paint the filled part in the covariate's colour."""
-        half = HANDLE_PX // 2
-        self.setStyleSheet(f"""
-            QSlider {{ min-height: {HANDLE_PX + 4}px; }}
-            QSlider::groove:horizontal {{ height: 4px; background: {theme.line}; border-radius: 2px; }}
-            QSlider::sub-page:horizontal {{ background: {colour}; border-radius: 2px; }}
-            QSlider::handle:horizontal {{ background: {theme.raised}; border: 2px solid {colour};
-                width: {HANDLE_PX - 4}px; height: {HANDLE_PX - 4}px; margin: -{half - 2}px 0;
-                border-radius: {half}px; }}
-            QSlider::handle:horizontal:hover, QSlider::handle:horizontal:focus {{ background: {colour}; }}
-        """)
-
-
-class Histogram(QWidget):
-    """Where data exist: bars over the slider's range, a tick at the population mean, the patient's mark."""
-
-    def __init__(self, covariate: Covariate, observed: NDArray[np.float64], parent: QWidget) -> None:
-        super().__init__(parent)
-        self._covariate = covariate
-        self._counts = bin_counts(covariate, observed)
-        self._patient: float | None = None
-        self._interval: tuple[float, float] | None = None
-        self._bar = self._tick = self._mark = self._rim = QColor()
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self._explain()
-
-    def show_patient(self, value: float | None, interval: tuple[float, float] | None = None) -> None:
-        """Mark a patient's value (real units).
-
-        Args:
-            value: None for nobody's.
-            interval: low and high end (95 %) where the value was inferred; None where it was known.
-        """
-        if (value, interval) != (self._patient, self._interval):
-            self._patient, self._interval = value, interval
-            self._explain()
-            self.update()
-
-    def sizeHint(self) -> QSize:
-        """As wide as there is room, low."""
-        return QSize(120, 26)
-
-    def set_colours(self, theme: Theme, colour: str) -> None:
-        """Bars muted, the mean in the covariate's colour, the patient in that of the words."""
-        self._bar, self._tick = QColor(theme.muted), QColor(colour)
-        self._mark, self._rim = QColor(theme.text), QColor(theme.window)
-        self._bar.setAlpha(110)
-        self.update()
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        """Bars first, the mean over them, then the patient."""
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        left, width, height = HANDLE_PX / 2, self.width() - HANDLE_PX, self.height() - BAND_PX
-        step = width / len(self._counts)
-        tallest = max(self._counts.max(), 1.0)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(self._bar)
-        for index, count in enumerate(self._counts):
-            bar = height * count / tallest
-            painter.drawRect(QRectF(left + index * step, height - bar, max(step - 1.0, 1.0), bar))
-        x = self._x(self._covariate.centre)
-        painter.setPen(QPen(self._tick, 2.0))
-        painter.drawLine(QPointF(x, 0.0), QPointF(x, self.height()))
-        if self._patient is not None:
-            self._paint_patient(painter, self._x(self._patient))
-        painter.end()
-
-    def _paint_patient(self, painter: QPainter, x: float) -> None:
-        """A triangle that points at the value, and a band beneath the bars."""
-        base = self.height() - BAND_PX
-        corners = [(x, base - MARK_PX), (x + MARK_PX / 2, base), (x - MARK_PX / 2, base)]
-        painter.setBrush(self._mark)
-        painter.setPen(QPen(self._rim, 1.0))
-        painter.drawPolygon(QPolygonF([QPointF(*corner) for corner in corners]))
-        if self._interval is not None:
-            low, high = map(self._x, self._interval)
-            painter.fillRect(QRectF(low, base, max(high - low, 1.0), BAND_PX), self._mark)
-
-    def _x(self, value: float) -> float:
-        """The horizontal pixel coordinate under the slider's handle at a real value."""
-        low, high = self._covariate.range
-        share = (value - low) / (high - low) if high > low else 0.5
-        return HANDLE_PX / 2 + min(max(share, 0.0), 1.0) * (self.width() - HANDLE_PX)
-
-    def _explain(self) -> None:
-        """Say on hover what is drawn."""
-        covariate = self._covariate
-        marks = [f"Tick: population mean {mean_reading(covariate)}"]
-        if self._patient is not None:
-            marks.append(f"Triangle: {patient_reading(covariate, self._patient, self._interval)}")
-        self.setToolTip("\n".join([f"Bars: {self._bars_reading()}", *marks]))
-
-    def _bars_reading(self) -> str:
-        """Whom the bars count, in words."""
-        if self._covariate.kind == "binary":
-            levels = zip(self._counts, self._covariate.levels, strict=True)
-            return " · ".join(f"{int(count)} {name}" for count, name in levels)
-        low, high = self._covariate.range
-        where = f"between {low:g} and {high:g} {self._covariate.unit}".rstrip()
-        return f"{int(self._counts.sum())} shapes behind the atlas {where}"
 
 
 class CovariateRow(QWidget):
@@ -258,10 +55,7 @@ class CovariateRow(QWidget):
         self.histogram = Histogram(covariate, observed, self)
         self.reset = _reset_button(covariate, self)
         self.spin = ValueBox(covariate, self) if covariate.kind == "continuous" else None
-        levels = covariate.levels if covariate.kind == "binary" else ()
-        self.buttons = [
-            LevelButton(name, value, self) for name, value in zip(levels, (-1.0, 1.0), strict=False)
-        ]
+        self.buttons = level_buttons(covariate, self) if covariate.kind == "binary" else []
         self.reading = QLabel(self)
         self.reading.setObjectName("muted")
         self.set_home(covariate.centre, is_patient=False)
@@ -378,33 +172,6 @@ class CovariateRow(QWidget):
         button = self.sender()
         assert isinstance(button, LevelButton)
         self.value_settled.emit(self.covariate.name, button.level)
-
-
-class ValueBox(QDoubleSpinBox):
-    """A real value of a continuous covariate, inside its observed range."""
-
-    def __init__(self, covariate: Covariate, parent: QWidget) -> None:
-        super().__init__(parent)
-        low, high = covariate.range
-        self.setDecimals(decimals(covariate))
-        self.setRange(low, high)
-        self.setSingleStep(10.0 ** (1 - decimals(covariate)))
-        self.setKeyboardTracking(False)
-        self.setAlignment(Qt.AlignmentFlag.AlignRight)
-        self.setFixedWidth(76)
-        self.setToolTip(f"{low:g} to {high:g} {covariate.unit}".strip())
-        self.setAccessibleName(f"{label(covariate.name)} in {covariate.unit}".removesuffix(" in "))
-
-
-class LevelButton(QPushButton):
-    """One level of a binary covariate."""
-
-    def __init__(self, level: str, value: float, parent: QWidget) -> None:
-        super().__init__(level, parent)
-        self.level = value
-        self.setCheckable(True)
-        self.setMinimumWidth(38)
-        self.setStyleSheet("padding: 3px 6px;")
 
 
 def _reset_button(covariate: Covariate, parent: QWidget) -> QToolButton:

@@ -31,9 +31,9 @@ SCAN_ENDINGS = ("stl", "ply", "obj", "vtk", "vtp", "glb", "nii", "nii.gz", "nrrd
 RESOLUTIONS = (64, EXACT_RESOLUTION, 192, 256)
 
 
-def ask_open_path(parent: QWidget, filters: str) -> Path | None:
+def ask_open_path(parent: QWidget) -> Path | None:
     """The atlas to open, or None."""
-    name, _ = QFileDialog.getOpenFileName(parent, "Open an atlas", "", filters)
+    name, _ = QFileDialog.getOpenFileName(parent, "Open an atlas", "", ATLAS_FILTER)
     return Path(name) if name else None
 
 
@@ -97,15 +97,8 @@ class LabelDialog(QDialog):
         self.choice.setAccessibleName("Label")
         for number, title in labels.titles:
             self.choice.addItem(title, number)
-        buttons = QDialogButtonBox(self)
-        buttons.addButton("Cancel", QDialogButtonBox.ButtonRole.RejectRole)
-        buttons.addButton("Open", QDialogButtonBox.ButtonRole.AcceptRole).setDefault(True)
-        buttons.accepted.connect(self.accept)
-        buttons.rejected.connect(self.reject)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(18, 18, 18, 14)
-        column.setSpacing(14)
-        for widget in (question, self.choice, buttons):
+        column = _column(self)
+        for widget in (question, self.choice, _buttons(self, "Open")):
             column.addWidget(widget)
 
 
@@ -155,20 +148,29 @@ class ExportDialog(QDialog):
         note = QLabel("Millimetres. A .json beside each file records the covariates and the atlas.", self)
         note.setObjectName("muted")
         note.setWordWrap(True)
-        buttons = QDialogButtonBox(self)
-        buttons.addButton("Cancel", QDialogButtonBox.ButtonRole.RejectRole)
-        export = buttons.addButton("Export", QDialogButtonBox.ButtonRole.AcceptRole)
-        export.setDefault(True)
-        buttons.accepted.connect(self.accept)
-        buttons.rejected.connect(self.reject)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(18, 18, 18, 14)
-        column.setSpacing(14)
+        column = _column(self)
         column.addLayout(form)
         column.addWidget(note)
-        column.addWidget(buttons)
+        column.addWidget(_buttons(self, "Export"))
 
     def _browse(self) -> None:
         name = QFileDialog.getExistingDirectory(self, "Export into", self.folder.text())
         if name:
             self.folder.setText(name)
+
+
+def _column(dialog: QDialog) -> QVBoxLayout:
+    column = QVBoxLayout(dialog)
+    column.setContentsMargins(18, 18, 18, 14)
+    column.setSpacing(14)
+    return column
+
+
+def _buttons(dialog: QDialog, accept: str) -> QDialogButtonBox:
+    """Cancel, and what the Enter key does."""
+    buttons = QDialogButtonBox(dialog)
+    buttons.addButton("Cancel", QDialogButtonBox.ButtonRole.RejectRole)
+    buttons.addButton(accept, QDialogButtonBox.ButtonRole.AcceptRole).setDefault(True)
+    buttons.accepted.connect(dialog.accept)
+    buttons.rejected.connect(dialog.reject)
+    return buttons

@@ -38,7 +38,6 @@ from naisr_viewer.patients import Labels
 from naisr_viewer.state import OF_A_PATIENT, ExplorerState, Layout, visible_panels
 from naisr_viewer.views.covariate_panel import CovariatePanel
 from naisr_viewer.views.dialogs import (
-    ATLAS_FILTER,
     ExportDialog,
     about,
     ask_image_path,
@@ -46,6 +45,7 @@ from naisr_viewer.views.dialogs import (
     ask_open_path,
     ask_scan_path,
 )
+from naisr_viewer.views.empty_page import EmptyPage
 from naisr_viewer.views.patient_panel import PatientPanel
 from naisr_viewer.views.scale_bar import ScaleBar
 from naisr_viewer.views.shape_view import DIRECTIONS, ShapeView
@@ -153,9 +153,7 @@ class MainWindow(QMainWindow):
 
     def show_opening(self, name: str) -> None:
         """Say on the empty page that a file is being opened; an empty name invites to open one."""
-        self._invitation.setText(f"Opening {name} …" if name else "Drop an atlas here")
-        for widget in self._invited:
-            widget.setVisible(not name)
+        self._empty.show_opening(name)
 
     def show_progress(self, fraction: float | None) -> None:
         """The bar and its cancel button at the bottom right; None hides them, at 0 it only says: busy."""
@@ -241,7 +239,9 @@ class MainWindow(QMainWindow):
         bar.addWidget(dismiss)
         self._error_bar.hide()
         self._centre = QStackedWidget(self)
-        self._centre.addWidget(self._empty_page())
+        self._empty = EmptyPage(self)
+        self._empty.open_requested.connect(self._open)
+        self._centre.addWidget(self._empty)
         self._centre.addWidget(self.shapes)
         right = QVBoxLayout()
         right.setSpacing(0)
@@ -256,28 +256,6 @@ class MainWindow(QMainWindow):
         row.addWidget(self.patients)
         self.patients.open_requested.connect(self._open_scan)
         self.setCentralWidget(body)
-
-    def _empty_page(self) -> QWidget:
-        page = QFrame(self)
-        page.setObjectName("canvasArea")
-        self._invitation = QLabel(page)
-        self._invitation.setObjectName("emptyTitle")
-        hint = QLabel("a .safetensors file made by “naisr train”, or", page)
-        hint.setObjectName("muted")
-        button = QPushButton("Open atlas…", page)
-        button.clicked.connect(self._open)
-        zone = QFrame(page)
-        zone.setObjectName("dropZone")
-        column = QVBoxLayout(zone)
-        column.setContentsMargins(70, 54, 70, 54)
-        column.setSpacing(12)
-        self._invited = (hint, button)
-        for widget in (self._invitation, *self._invited):
-            column.addWidget(widget, 0, Qt.AlignmentFlag.AlignHCenter)
-        outer = QVBoxLayout(page)
-        outer.addWidget(zone, 0, Qt.AlignmentFlag.AlignCenter)
-        self.show_opening("")
-        return page
 
     def _make_status(self) -> None:
         bar = self.statusBar()
@@ -393,7 +371,7 @@ class MainWindow(QMainWindow):
         self.addToolBar(bar)
 
     def _open(self) -> None:
-        path = ask_open_path(self, ATLAS_FILTER)
+        path = ask_open_path(self)
         if path is not None:
             self.open_requested.emit(path)
 

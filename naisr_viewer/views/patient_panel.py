@@ -21,20 +21,13 @@ from PySide6.QtWidgets import (
 )
 
 from naisr_model.covariates import Covariate
-from naisr_viewer.captions import volume
 from naisr_viewer.patients import Named, Patient
 from naisr_viewer.state import ExplorerState
-from naisr_viewer.views.patient_parts import (
-    AlignmentPart,
-    ComparePart,
-    KnownPart,
-    NumberField,
-    ScanPart,
-    button,
-    exchange,
-    paragraph,
-    result_part,
-)
+from naisr_viewer.views.patient_known import KnownPart, NumberField
+from naisr_viewer.views.patient_pieces import button, exchange, paragraph
+from naisr_viewer.views.patient_result import ComparePart, result_part
+from naisr_viewer.views.patient_scan import AlignmentPart, ScanPart
+from naisr_viewer.words import volume
 
 PANEL_WIDTH = 300
 ROWS_IN_SIGHT = 4

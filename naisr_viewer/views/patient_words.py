@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from naisr_model.covariates import Covariate
-from naisr_viewer.captions import volume
 from naisr_viewer.patients import Fitted, Method, Scan
 from naisr_viewer.state import label
-from naisr_viewer.views.covariate_panel import reading
+from naisr_viewer.words import capitalised, reading, volume
 
 LONGEST_WORD = 28
 """Letters that surely fit into a line; longer names are broken anywhere."""
@@ -65,9 +64,8 @@ def findings(fit: Fitted, covariates: Sequence[Covariate]) -> list[tuple[str, st
 
 
 def sentence(text: str) -> str:
-    """``text`` with a capital letter in front, unless it begins with a name such as ``p01.stl``."""
-    first = text.split(" ", 1)[0]
-    return breakable(text[:1].upper() + text[1:] if first.isalpha() else text)
+    """``text`` as it stands in the panel, with a capital letter in front."""
+    return breakable(capitalised(text))
 
 
 def breakable(text: str) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from importlib import import_module
 from threading import Thread
 from typing import TYPE_CHECKING
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QRect, Qt, Signal
-from PySide6.QtGui import QImage, QResizeEvent, QSurfaceFormat
+from PySide6.QtGui import QResizeEvent, QSurfaceFormat
 from PySide6.QtOpenGLWidgets import QOpenGLWidget
 from PySide6.QtWidgets import QFrame, QLabel, QVBoxLayout, QWidget
 
@@ -24,9 +23,9 @@ from naisr_viewer.state import (
     AtlasCard,
     Panel,
     all_panels,
-    panel_title,
 )
-from naisr_viewer.views.colour_bar import HEIGHT_PX, WIDTH_PX, ColourBar
+from naisr_viewer.views.cell import TITLE_PX, Cell, drawn_height, make_cell, strip_height
+from naisr_viewer.views.grid import cells, columns_for, separators
 from naisr_viewer.views.theme import LIGHT, Theme, ghost_colour, panel_colour
 
 if TYPE_CHECKING:
@@ -35,44 +34,15 @@ if TYPE_CHECKING:
 ROOM = 1.25
 """A shape is framed with this much room, so that it can grow while a slider moves."""
 
-TITLE_PX = 36
-CAPTION_PX = 52
-"""Strips above and beneath each shape, kept free for words."""
-
 OF_PATIENTS = tuple(
     dict.fromkeys(panel for shown in OF_A_PATIENT.values() for panel in shown if panel != FULL_SHAPE)
 )
 """Sub-plots besides those that every atlas has."""
 
-SIGNED = {"scan": True, "certainty": False, "change": True}
-"""Kinds of panels that have a colour bar, and whether it has two sides."""
-
 NO_FACES = np.zeros((0, 3), np.int64)
 
 DRAWING = "naisr_viewer.views.canvas"
 """The module that draws; loaded behind the window, because VTK takes a while."""
-
-HINTS = {
-    "template": "The shape from which all others are made.",
-    "effect": (
-        "The template moved by this covariate alone, all others at the population mean.\n"
-        "Displacements add up at a point; the surfaces shown here do not add up to the full shape."
-    ),
-    "shape": "The template moved by all covariates together.",
-    "scan": (
-        "The patient's scan, coloured by its distance to the full shape in mm:\n"
-        "orange where the scan lies outside the shape (+), blue where it lies inside (−)."
-    ),
-    "certainty": (
-        "The full shape, coloured by how far its surface may lie off in mm:\n"
-        "half of the 95 % interval of its place, inwards or outwards."
-    ),
-    "before": "The shape that changes are counted from.",
-    "change": (
-        "The full shape, coloured by how far it has moved since “before” in mm:\n"
-        "orange where it moved outwards (+), blue where it moved inwards (−)."
-    ),
-}
 
 DIRECTIONS: dict[str, tuple[tuple[float, float, float], tuple[float, float, float]]] = {
     "the front": ((0, -1, 0), (0, 0, 1)),
@@ -86,74 +56,6 @@ DIRECTIONS: dict[str, tuple[tuple[float, float, float], tuple[float, float, floa
 
 OBLIQUE = ((0.9, -0.45, 0.15), (0.0, 0.0, 1.0))
 """The view an atlas opens with: from the left and a little from the front."""
-
-
-def columns_for(count: int, canvas_aspect: float, shape_aspect: float) -> int:
-    """Columns of a grid of ``count`` panels in which a shape is drawn largest.
-
-    Args:
-        count: how many panels.
-        canvas_aspect: width over height of the whole canvas.
-        shape_aspect: width over height of a shape as seen.
-    """
-
-    def drawn_height(columns: int) -> float:
-        rows = -(-count // columns)
-        return min(1 / rows, canvas_aspect / columns / shape_aspect)
-
-    return max(range(1, count + 1), key=lambda columns: (round(drawn_height(columns), 6), -columns))
-
-
-def cells(count: int, columns: int) -> list[tuple[float, float, float, float]]:
-    """Left, top, width and height of each panel as shares of the canvas; the last fills its row."""
-    rows = -(-count // columns)
-    width, height = 1 / columns, 1 / rows
-    places = [((i % columns) * width, (i // columns) * height, width, height) for i in range(count)]
-    left, top, _, _ = places[-1]
-    return [*places[:-1], (left, top, 1 - left, height)]
-
-
-def strip_height(panels: Sequence[Panel]) -> int:
-    """Pixels beneath every shape for colour bars; none where no panel has one."""
-    return HEIGHT_PX if any(panel.kind in SIGNED for panel in panels) else 0
-
-
-def drawn_height(area: QRect, strip: int) -> int:
-    """Pixels left for the shape between the title and what stands beneath it."""
-    return max(area.height() - TITLE_PX - CAPTION_PX - strip, 1)
-
-
-def separators(areas: Sequence[QRect]) -> set[tuple[int, int, int, int]]:
-    """Left, top, width and height of the lines between sub-plots."""
-    beside = {(area.left(), area.top(), 1, area.height()) for area in areas if area.left() > 0}
-    return beside | {(area.left(), area.top(), area.width(), 1) for area in areas if area.top() > 0}
-
-
-@dataclass(eq=False)
-class Cell:
-    """One sub-plot on screen.
-
-    Attributes:
-        title: the label above.
-        volume: the label beneath.
-        bar: what its colours stand for; None where it has none.
-        result: the surface, or None as long as there is none.
-    """
-
-    title: QLabel
-    volume: QLabel
-    bar: ColourBar | None
-    result: SurfaceResult | None = None
-
-    @property
-    def has_surface(self) -> bool:
-        """Whether there is anything to see."""
-        return self.result is not None and len(self.result.points_mm) > 0
-
-    @property
-    def widgets(self) -> list[QWidget]:
-        """All that stands around the shape."""
-        return [self.title, self.volume, *([] if self.bar is None else [self.bar])]
 
 
 class ShapeView(QWidget):
@@ -214,7 +116,7 @@ class ShapeView(QWidget):
         self.prepare()
         self._remove_cells()
         self._atlas = atlas
-        self._cells = {panel: self._make_cell(panel, atlas) for panel in (*all_panels(atlas), *OF_PATIENTS)}
+        self._cells = {panel: make_cell(panel, atlas, self) for panel in (*all_panels(atlas), *OF_PATIENTS)}
         self._ghost = (None, NO_FACES)
         self._direction = OBLIQUE
         self._theme = theme
@@ -298,10 +200,6 @@ class ShapeView(QWidget):
         if self._canvas is not None:
             self._canvas.look(*self._direction)
             self.reset_camera()
-
-    def grab_image(self) -> QImage:
-        """The sub-plots with their labels, as on screen."""
-        return self.grab().toImage()
 
     def clear(self) -> None:
         """Release the render window and all labels; nothing is drawn afterwards."""
@@ -387,20 +285,6 @@ class ShapeView(QWidget):
             line.deleteLater()
         self._cells, self._separators, self._visible = {}, [], ()
 
-    def _make_cell(self, panel: Panel, atlas: AtlasCard) -> Cell:
-        colour = panel_colour(atlas, panel)
-        title = QLabel(f'<span style="color:{colour}">●</span>&nbsp;{panel_title(panel)}', self)
-        title.setObjectName("panelTitle")
-        title.setToolTip(HINTS[panel.kind])
-        title.setWhatsThis(HINTS[panel.kind])
-        volume = QLabel(self)
-        volume.setObjectName("volume")
-        volume.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
-        bar = ColourBar(SIGNED[panel.kind], self) if panel.kind in SIGNED else None
-        if bar is not None:
-            bar.setToolTip(HINTS[panel.kind])
-        return Cell(title, volume, bar)
-
     def _index(self, panel: Panel) -> int:
         """Which of the canvas's sub-plots a panel has."""
         return list(self._cells).index(panel)
@@ -453,21 +337,10 @@ class ShapeView(QWidget):
     def _place_labels(self, areas: dict[Panel, QRect]) -> None:
         for panel, cell in self._cells.items():
             if panel in areas:
-                self._place_around(cell, areas[panel])
+                cell.place(areas[panel], self._strip)
             for widget in cell.widgets:
                 widget.setVisible(panel in areas)
                 widget.raise_()
-
-    def _place_around(self, cell: Cell, area: QRect) -> None:
-        """The title above the shape; beneath it the colour bar, and the caption under that."""
-        cell.title.setGeometry(area.left(), area.top(), area.width(), TITLE_PX)
-        height = CAPTION_PX + self._strip
-        top = area.top() + area.height() - height
-        cell.volume.setGeometry(area.left(), top, area.width(), height)
-        cell.volume.setContentsMargins(0, self._strip, 0, 0)
-        if cell.bar is not None:
-            width = min(WIDTH_PX, area.width())
-            cell.bar.setGeometry(area.left() + (area.width() - width) // 2, top, width, HEIGHT_PX)
 
     def _place_separators(self, areas: dict[Panel, QRect]) -> None:
         for line in self._separators:

@@ -199,7 +199,3 @@ def test_without_display_and_xvfb_the_remedy_is_named(
     error = capsys.readouterr().err
     assert "install the package 'xvfb'" in error
     assert error.count("\n") == 1
-
-
-def test_the_default_atlas_is_the_shipped_airway():
-    assert app.default_atlas().name == "airway.safetensors"

@@ -12,7 +12,7 @@ from PySide6.QtGui import QImage
 
 from naisr_model import __version__
 from naisr_model.errors import InputError
-from naisr_viewer.controller import Controller, in_words
+from naisr_viewer.controller import Controller
 from naisr_viewer.requests import (
     EXACT_RESOLUTION,
     PREVIEW_RESOLUTION,
@@ -26,6 +26,7 @@ from naisr_viewer.views.covariate_panel import CovariatePanel
 from naisr_viewer.views.main_window import MainWindow
 from naisr_viewer.views.shape_view import ShapeView
 from naisr_viewer.views.theme import ThemeChoice
+from naisr_viewer.words import in_words
 from naisr_viewer.worker import Worker
 
 AGE_ONLY = Panel("effect", "age")

@@ -10,13 +10,17 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QColor
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
 from naisr_model.covariates import Covariate
 from naisr_viewer.patients import Fitted, Patient, Reading, Scan
 from naisr_viewer.state import AtlasCard, ExplorerState, opened, with_patient, with_value
 from naisr_viewer.views import covariate_panel as cp
+from naisr_viewer.views.histogram import BAND_PX, Histogram, bin_counts
+from naisr_viewer.views.slider import HANDLE_PX, SLIDER_STEPS, JumpSlider, slider_position, slider_value
 from naisr_viewer.views.theme import DARK, LIGHT, covariate_colour, palette
+from naisr_viewer.words import decimals
 
 
 @pytest.fixture
@@ -39,22 +43,22 @@ def heard(panel) -> list[tuple[str, str, float]]:
     return acts
 
 
-def at(slider: cp.JumpSlider, share: float) -> QPoint:
-    x = cp.HANDLE_PX / 2 + share * (slider.width() - cp.HANDLE_PX)
+def at(slider: JumpSlider, share: float) -> QPoint:
+    x = HANDLE_PX / 2 + share * (slider.width() - HANDLE_PX)
     return QPoint(round(x), slider.height() // 2)
 
 
 def test_slider_positions_and_real_values_agree(card):
     for covariate in card.covariates:
         for value in np.linspace(covariate.range[0], covariate.range[1], 7):
-            position = cp.slider_position(covariate, value)
-            step = (covariate.range[1] - covariate.range[0]) / cp.SLIDER_STEPS
-            assert abs(cp.slider_value(covariate, position) - value) <= step
+            position = slider_position(covariate, value)
+            step = (covariate.range[1] - covariate.range[0]) / SLIDER_STEPS
+            assert abs(slider_value(covariate, position) - value) <= step
 
 
 def test_digits_suit_the_range():
     def of(low: float, high: float) -> int:
-        return cp.decimals(Covariate("x", "", "continuous", 0, 1, (low, high)))
+        return decimals(Covariate("x", "", "continuous", 0, 1, (low, high)))
 
     assert (of(1, 233), of(3.9, 94), of(0, 1), of(0, 5000)) == (0, 1, 2, 0)
 
@@ -62,15 +66,15 @@ def test_digits_suit_the_range():
 def test_the_histogram_counts_everybody(card):
     for covariate in card.covariates:
         observed = card.population.observed(covariate.name)
-        assert cp.bin_counts(covariate, observed).sum() == len(observed)
-    assert len(cp.bin_counts(card.covariates[2], np.array([-1.0, -1.0, 1.0]))) == 2
+        assert bin_counts(covariate, observed).sum() == len(observed)
+    assert len(bin_counts(card.covariates[2], np.array([-1.0, -1.0, 1.0]))) == 2
 
 
 def test_showing_a_value_says_nothing(panel, heard, card):
     state = with_value(opened(ExplorerState(), card), "age", 180)
     panel.show_values(with_value(state, "sex", 1))
     assert panel.rows["age"].spin.value() == 180
-    assert panel.rows["age"].slider.value() == cp.slider_position(card.covariates[0], 180)
+    assert panel.rows["age"].slider.value() == slider_position(card.covariates[0], 180)
     assert [button.isChecked() for button in panel.rows["sex"].buttons] == [False, True]
     assert heard == []
 
@@ -95,7 +99,7 @@ def test_a_click_brings_the_handle_there(panel, heard):
     QTest.mouseClick(slider, Qt.MouseButton.LeftButton, pos=at(slider, 0.25))
     assert heard[-1][:2] == ("settled", "weight")
     assert heard[-1][2] == pytest.approx(4 + 0.25 * 91, abs=1)
-    assert slider.handle_x() == pytest.approx(at(slider, 0.25).x(), abs=1)
+    assert slider.sliderPosition() == pytest.approx(0.25 * SLIDER_STEPS, abs=5)
 
 
 def test_other_buttons_do_nothing(panel, heard):
@@ -148,7 +152,7 @@ def test_resets_are_asked_for(panel, qtbot):
 def test_units_and_colours_are_on_every_row(panel, card):
     for covariate in card.covariates:
         row = panel.rows[covariate.name]
-        texts = [child.text() for child in row.findChildren(cp.QLabel)]
+        texts = [child.text() for child in row.findChildren(QLabel)]
         assert covariate.name.capitalize() in texts
         assert covariate.unit in texts
         assert covariate_colour(card, covariate.name) in row.slider.styleSheet()
@@ -173,7 +177,7 @@ def with_fit(card: AtlasCard) -> ExplorerState:
     return with_patient(opened(ExplorerState(), card), patient)
 
 
-def inked(histogram: cp.Histogram, colour: str) -> np.ndarray:
+def inked(histogram: Histogram, colour: str) -> np.ndarray:
     """Columns and rows of the pixels in this colour, ``[n, 2]``."""
     image, wanted = histogram.grab().toImage(), QColor(colour)
     places = [(x, y) for x in range(image.width()) for y in range(image.height())]
@@ -202,10 +206,10 @@ def test_the_patient_is_marked_under_the_slider(panel, card, theme):
 
     def x_of(value: float) -> float:
         share = (value - 4) / 91
-        return cp.HANDLE_PX / 2 + share * (row.histogram.width() - cp.HANDLE_PX)
+        return HANDLE_PX / 2 + share * (row.histogram.width() - HANDLE_PX)
 
-    band = mark[mark[:, 1] >= row.histogram.height() - cp.BAND_PX]
-    triangle = mark[mark[:, 1] < row.histogram.height() - cp.BAND_PX]
+    band = mark[mark[:, 1] >= row.histogram.height() - BAND_PX]
+    triangle = mark[mark[:, 1] < row.histogram.height() - BAND_PX]
     assert (band[:, 0].min(), band[:, 0].max()) == pytest.approx((x_of(18.2), x_of(34.9)), abs=1.5)
     assert triangle[:, 0].mean() == pytest.approx(x_of(21.34), abs=1.5)
     assert len(triangle) > 15
@@ -220,7 +224,7 @@ def test_a_known_covariate_has_no_band(panel, card):
     panel.show_values(with_fit(card))
     histogram = panel.rows["age"].histogram
     mark = inked(histogram, LIGHT.text)
-    assert len(mark) > 15 and mark[:, 1].max() < histogram.height() - cp.BAND_PX
+    assert len(mark) > 15 and mark[:, 1].max() < histogram.height() - BAND_PX
 
 
 def test_marks_are_told_apart_on_hover(panel, card):

@@ -17,11 +17,11 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from naisr_viewer.app import make_window
-from naisr_viewer.captions import gained, volume
 from naisr_viewer.engine import Engine
 from naisr_viewer.requests import ExportChoice
 from naisr_viewer.state import BEFORE, CERTAINTY, CHANGE, FULL_SHAPE, SCAN, TEMPLATE, Layout
 from naisr_viewer.views import main_window
+from naisr_viewer.words import gained, volume
 
 CUBIC_CM = egg(6.0, 1.0).volume / 1000
 

@@ -46,12 +46,6 @@ def test_pictures_of_foreign_values_answer_nothing():
     assert measure.first_shown([(0.0, 10.0)], pictures((1.0, (99.0,)), (2.0, ()))) == []
 
 
-def test_percentiles():
-    assert measure.percentile([3.0, 1.0, 2.0], 0.5) == 2.0
-    assert measure.percentile(range(1, 101), 0.95) == 95
-    assert measure.percentile([7.0], 0.95) == 7.0
-
-
 def test_the_handle_swings_from_end_to_end():
     assert measure.swing(0.0) == 0.5
     assert measure.swing(measure.SWING_S / 2) == 1.0

@@ -14,13 +14,14 @@ from pytestqt.qtbot import QtBot
 
 from naisr_model.data import meshes, volumes
 from naisr_model.data.patients import POINT_ENDINGS
-from naisr_viewer.captions import gained, volume
 from naisr_viewer.patients import Fitted, Labels, Patient, Reading, Scan
 from naisr_viewer.state import ExplorerState, opened, showing, with_patient, without_patient
 from naisr_viewer.views import dialogs
 from naisr_viewer.views import patient_panel as pp
-from naisr_viewer.views.patient_parts import ChoiceBox, NumberField
+from naisr_viewer.views.patient_known import NumberField
+from naisr_viewer.views.patient_pieces import ChoiceBox
 from naisr_viewer.views.patient_words import UNITS, breakable, interval, sentence
+from naisr_viewer.words import gained, volume
 
 LEFT = Qt.MouseButton.LeftButton
 
@@ -60,6 +61,7 @@ def panel(qtbot: QtBot, start) -> pp.PatientPanel:
     panel.show()
     qtbot.waitExposed(panel)
     panel.activateWindow()
+    qtbot.waitUntil(panel.isActiveWindow)  # only then a click gives a field the focus
     return panel
 
 

@@ -33,6 +33,8 @@ from naisr_viewer.state import (
 )
 from naisr_viewer.views import canvas as cv
 from naisr_viewer.views import shape_view as sv
+from naisr_viewer.views.cell import CAPTION_PX
+from naisr_viewer.views.grid import cells, columns_for
 from naisr_viewer.views.scale_bar import round_length_mm
 from naisr_viewer.views.theme import DARK, LIGHT, SCAN_COLOUR, SHAPE_COLOUR, scale_colours
 
@@ -40,16 +42,16 @@ from naisr_viewer.views.theme import DARK, LIGHT, SCAN_COLOUR, SHAPE_COLOUR, sca
 def test_cells_cover_the_canvas_without_overlap():
     for count in range(1, 9):
         for columns in range(1, count + 1):
-            boxes = sv.cells(count, columns)
+            boxes = cells(count, columns)
             assert len(boxes) == count
             assert sum(width * height for _, _, width, height in boxes) == pytest.approx(1)
 
 
 def test_tall_shapes_stand_in_a_row_and_flat_ones_are_stacked():
-    assert sv.columns_for(5, canvas_aspect=2.0, shape_aspect=0.3) == 5
-    assert sv.columns_for(5, canvas_aspect=0.5, shape_aspect=4.0) == 1
-    assert sv.columns_for(5, canvas_aspect=1.4, shape_aspect=0.9) == 3
-    assert sv.columns_for(1, canvas_aspect=1.4, shape_aspect=0.9) == 1
+    assert columns_for(5, canvas_aspect=2.0, shape_aspect=0.3) == 5
+    assert columns_for(5, canvas_aspect=0.5, shape_aspect=4.0) == 1
+    assert columns_for(5, canvas_aspect=1.4, shape_aspect=0.9) == 3
+    assert columns_for(1, canvas_aspect=1.4, shape_aspect=0.9) == 1
 
 
 @pytest.mark.parametrize(("pixels_per_mm", "length_mm"), [(1.0, 50), (0.9, 100), (4.0, 20), (100.0, 0.5)])
@@ -99,7 +101,7 @@ def show(view: sv.ShapeView, engine, card: AtlasCard, **values: float) -> None:
 
 def rows_of_colour(view: sv.ShapeView, colour: str) -> int:
     """How many pixel rows hold a hue like ``colour``."""
-    picture = view.grab_image()
+    picture = view.grab().toImage()
     hue = QColor(colour).hue()
     count = 0
     for y in range(0, picture.height(), 2):
@@ -406,7 +408,7 @@ def test_a_colour_bar_stands_between_shape_and_caption(views):
     bar, shape = cell.bar.geometry(), inside(views, SCAN)[0]
     text_top = cell.volume.geometry().top() + cell.volume.contentsMargins().top()
     assert shape.stop <= bar.top() and bar.bottom() < text_top
-    assert views.height() - text_top == sv.CAPTION_PX
+    assert views.height() - text_top == CAPTION_PX
     assert cell.bar.isVisible() and abs(bar.center().x() - cell.title.geometry().center().x()) <= 1
     plain = views._cells[FULL_SHAPE].volume
     assert plain.geometry().top() + plain.contentsMargins().top() == text_top

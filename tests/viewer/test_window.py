@@ -17,8 +17,8 @@ from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
 
 from naisr_viewer.requests import EXACT_RESOLUTION, PREVIEW_RESOLUTION
 from naisr_viewer.state import FULL_SHAPE, Layout, Panel
-from naisr_viewer.views.covariate_panel import HANDLE_PX, JumpSlider
 from naisr_viewer.views.dialogs import ExportDialog
+from naisr_viewer.views.slider import HANDLE_PX, JumpSlider
 from naisr_viewer.views.theme import DARK, ThemeChoice
 
 AGE_ONLY = Panel("effect", "age")

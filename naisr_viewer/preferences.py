@@ -1,0 +1,47 @@
+"""What the program remembers of its user from one run to the next."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import QSettings
+
+from naisr_viewer.views.theme import ThemeChoice
+
+RECENT_FILES = 8
+
+THEME, RECENT = "theme", "recent"
+"""Names in the user's settings."""
+
+
+class Preferences:
+    """Recent atlases and the theme.
+
+    Args:
+        settings: where they are kept.
+    """
+
+    def __init__(self, settings: QSettings) -> None:
+        self._settings = settings
+
+    @property
+    def theme(self) -> ThemeChoice:
+        """The theme chosen last; the system's before the first choice."""
+        return ThemeChoice(str(self._settings.value(THEME, ThemeChoice.SYSTEM.value)))
+
+    def set_theme(self, choice: ThemeChoice) -> None:
+        """Have it again in the next run."""
+        self._settings.setValue(THEME, choice.value)
+
+    @property
+    def recent(self) -> list[Path]:
+        """Files that were opened and still exist, the last one first."""
+        stored = self._settings.value(RECENT, [])
+        # A list of one comes back from the file as its only text.
+        names = [stored] if isinstance(stored, str) else list(stored or [])  # type: ignore[call-overload]
+        return [Path(name) for name in names if Path(name).is_file()]
+
+    def remember(self, path: Path) -> None:
+        """Put a file in front of the recent ones."""
+        recent = [path, *(other for other in self.recent if other != path)][:RECENT_FILES]
+        self._settings.setValue(RECENT, [str(each) for each in recent])

@@ -1,0 +1,83 @@
+"""The slider of a covariate, and how its positions stand for real values."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QMouseEvent
+from PySide6.QtWidgets import QSlider, QWidget
+
+from naisr_model.covariates import Covariate
+from naisr_viewer.views.theme import Theme
+
+SLIDER_STEPS = 1000
+"""Positions of a slider; a key press moves ten of them."""
+
+HANDLE_PX = 16
+"""Diameter of the slider handle; the histogram leaves half of it free on both sides."""
+
+
+def slider_position(covariate: Covariate, value: float) -> int:
+    """The slider position nearest to a real value."""
+    low, high = covariate.range
+    share = (value - low) / (high - low) if high > low else 0.0
+    return round(min(max(share, 0.0), 1.0) * SLIDER_STEPS)
+
+
+def slider_value(covariate: Covariate, position: int) -> float:
+    """The real value at a slider position."""
+    low, high = covariate.range
+    return low + (high - low) * position / SLIDER_STEPS
+
+
+def track_x(share: float, width: int) -> float:
+    """Where the handle's centre is at a share of the range, in pixels from the left of a slider so wide."""
+    return HANDLE_PX / 2 + share * (width - HANDLE_PX)
+
+
+class JumpSlider(QSlider):
+    """A slider whose handle comes to where it is pressed, and can be dragged on from there."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(Qt.Orientation.Horizontal, parent)
+        self.setRange(0, SLIDER_STEPS)
+        self.setSingleStep(SLIDER_STEPS // 100)
+        self.setPageStep(SLIDER_STEPS // 10)
+
+    def position_at(self, x: float) -> int:
+        """The slider position under a horizontal pixel coordinate."""
+        usable = max(1.0, self.width() - HANDLE_PX)
+        return round(min(max((x - HANDLE_PX / 2) / usable, 0.0), 1.0) * SLIDER_STEPS)
+
+    def place_of(self, share: float) -> QPoint:
+        """The middle of the handle, in pixels, where it stands at a share of the range."""
+        return QPoint(round(track_x(share, self.width())), self.height() // 2)
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Start dragging from the pressed place."""
+        if event.button() != Qt.MouseButton.LeftButton:
+            return
+        self.setSliderDown(True)
+        self.setSliderPosition(self.position_at(event.position().x()))
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Follow the pointer."""
+        if self.isSliderDown():
+            self.setSliderPosition(self.position_at(event.position().x()))
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        """End the drag."""
+        if event.button() == Qt.MouseButton.LeftButton:
+            self.setSliderDown(False)
+
+    def set_colours(self, theme: Theme, colour: str) -> None:
+        """Paint the filled part in the covariate's colour."""
+        half = HANDLE_PX // 2
+        self.setStyleSheet(f"""
+            QSlider {{ min-height: {HANDLE_PX + 4}px; }}
+            QSlider::groove:horizontal {{ height: 4px; background: {theme.line}; border-radius: 2px; }}
+            QSlider::sub-page:horizontal {{ background: {colour}; border-radius: 2px; }}
+            QSlider::handle:horizontal {{ background: {theme.raised}; border: 2px solid {colour};
+                width: {HANDLE_PX - 4}px; height: {HANDLE_PX - 4}px; margin: -{half - 2}px 0;
+                border-radius: {half}px; }}
+            QSlider::handle:horizontal:hover, QSlider::handle:horizontal:focus {{ background: {colour}; }}
+        """)
