@@ -386,10 +386,6 @@ class Individual:
             should_stop=should_stop,
         )
 
-    def elsewhere(self, vector: NDArray[np.float64]) -> Individual:
-        """The same person at other centred covariates ``[N]``, which makes the code less sure."""
-        return Individual(self.atlas, vector, self.latent, moved(self.posterior, vector))
-
     @cached_property
     def volume_cm3(self) -> float:
         """Volume of the smooth shape; the triangles of :attr:`surface` alone hold a little less."""
@@ -527,9 +523,10 @@ class Fit:
         Raises:
             InputError: for an unknown covariate or one out of range (unless ``extrapolate``).
         """
-        atlas = self.individual.atlas
+        atlas, person = self.individual.atlas, self.individual
         known = complete(atlas.covariates, {**self.covariates, **values}, extrapolate=extrapolate)
-        return self.individual.elsewhere(normalised_vector(atlas.covariates, known))
+        vector = normalised_vector(atlas.covariates, known)
+        return Individual(atlas, vector, person.latent, moved(person.posterior, vector))
 
     def _real(self, vector: NDArray[np.float64]) -> dict[str, float]:
         pairs = zip(self.individual.atlas.covariates, vector, strict=True)

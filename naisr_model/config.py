@@ -67,8 +67,6 @@ class LossWeights:
         first_order_reach: model units beyond which that error counts relative to the distance.
         latent: multiplies |z|^2 / (L sigma^2), so 2 is the paper's lambda_6 = 2 / L.
         latent_sigma: sigma of the latent prior.
-        visits: multiplies |z - m|^2 / (L sigma^2), m the mean code of the shape's subject: without it
-            nothing makes a code mean at one age what it means at another.
         centring: length of the mean over a binary covariate's two levels of its displacement at z = 0.
             The level 0 between them is never observed, so without this term that displacement could
             carry any offset common to everybody and the template would stand elsewhere.
@@ -86,7 +84,6 @@ class LossWeights:
     first_order_reach: float = 0.1
     latent: float = 2.0
     latent_sigma: float = 0.01
-    visits: float = 0.0
     centring: float = 0.0
     ridge: float = 0.0
     folding: float = 0.0
@@ -205,7 +202,6 @@ PRESETS: dict[str, Preset] = {
                 template_eikonal=10.0,
                 first_order=100.0,
                 latent=0.01,
-                visits=0.2,
                 centring=30.0,
                 ridge=0.02,
             ),

@@ -7,15 +7,9 @@ import torch
 from naisr_model.config import LossWeights, NetworkConfig, SirenConfig
 from naisr_model.evaluation.reference import PlainNaisr, plain_loss
 from naisr_model.learning import losses
-from naisr_model.learning.objective import (
-    Batch,
-    latent_term,
-    population_terms,
-    reconstruction_terms,
-    visits_term,
-)
+from naisr_model.learning.objective import Batch, latent_term, population_terms, reconstruction_terms
 from naisr_model.learning.residual import covariate_basis
-from naisr_model.learning.train import residual_latents, subject_means
+from naisr_model.learning.train import residual_latents
 from naisr_model.networks.naisr import Naisr
 
 
@@ -97,21 +91,6 @@ def test_residual_codes_are_uncorrelated_with_functions_of_the_covariates():
 def test_a_small_population_keeps_codes_to_spare():
     basis = covariate_basis(np.random.default_rng(0).normal(size=(10, 3)), binary=())
     assert basis.shape[1] <= 2
-
-
-def test_the_pull_of_a_subject_is_that_of_correlated_codes():
-    torch.manual_seed(0)
-    codes, subjects = torch.randn(5, 2).double().requires_grad_(), torch.tensor([0, 1, 0, 2, 0])
-    weights = LossWeights(latent=0.3, visits=1.2, latent_sigma=0.5)
-    expected = subject_means(codes.detach(), subjects)
-    terms = latent_term(codes, weights) | visits_term(codes, expected, weights)
-    (ours,) = torch.autograd.grad(torch.stack(list(terms.values())).sum(), codes)
-    # -2 log of the density of a subject's share plus a visit's own one, per element of the mean loss.
-    own, count = 1 / (0.3 + 1.2), (subjects[:, None] == subjects).double()
-    sizes = count.sum(dim=1, keepdim=True)
-    covariance = 0.25 * (own * torch.eye(5) + (1 / 0.3 - own) * count / sizes)
-    (theirs,) = torch.autograd.grad((codes * torch.linalg.solve(covariance, codes)).mean(), codes)
-    torch.testing.assert_close(ours, theirs)
 
 
 @pytest.mark.parametrize("dim", [2, 3])

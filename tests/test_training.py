@@ -47,23 +47,6 @@ def test_the_checkpoint_tells_how_it_was_trained(egg_atlas):
     assert [path.name for path in templates][-1] == "epoch_00100.ply"
 
 
-def test_visits_of_one_subject_keep_together_as_far_as_their_shapes_allow(egg_store, tmp_path):
-    pairs = tuple(f"S{number // 4}-{number % 2}" for number in range(24))  # of one sex, ages apart
-    store = dataclasses.replace(
-        egg_store, population=dataclasses.replace(egg_store.population, subjects=pairs)
-    )
-    within = []
-    for pull in (0.0, 1.0):
-        preset = egg_preset(epochs=40)
-        loss = dataclasses.replace(preset.training.loss, visits=pull)
-        preset = dataclasses.replace(preset, training=dataclasses.replace(preset.training, loss=loss))
-        trained = train(store, preset, tmp_path / f"{pull}.safetensors")
-        subjects = np.array(pairs)[~trained.population.held_out]
-        means = np.stack([trained.latents[subjects == own].mean(axis=0) for own in subjects])
-        within.append(np.sum((trained.latents - means) ** 2) / np.sum(trained.latents**2))
-    assert within[1] < 0.5 * within[0]
-
-
 def same(first, second):
     return all(torch.equal(first.weights[name], tensor) for name, tensor in second.weights.items()) and (
         np.array_equal(first.latents, second.latents)

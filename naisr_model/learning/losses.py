@@ -52,15 +52,6 @@ def latent_prior(latents: Tensor, sigma: float) -> Tensor:
     return latents.square().mean() / sigma**2
 
 
-def visits(latents: Tensor, expected: Tensor, sigma: float) -> Tensor:
-    """Mean of |z - m|^2 / (L sigma^2): codes of one subject about their mean m; both ``[shapes, L]``.
-
-    Together with :func:`latent_prior` the logarithm of a Gaussian in which visits of one subject
-    correlate (a random effect of the subject). ``m`` may be held constant: the gradient is the same.
-    """
-    return (latents - expected).square().mean() / sigma**2
-
-
 def centring(at_minus: Tensor, at_plus: Tensor) -> Tensor:
     """Mean length of the offset that a binary covariate's two displacements share.
 

@@ -99,16 +99,3 @@ def population_terms(
 def latent_term(latents: Tensor, weights: LossWeights) -> dict[str, Tensor]:
     """The weighted prior on the codes."""
     return {"latent": weights.latent * losses.latent_prior(latents, weights.latent_sigma)}
-
-
-def visits_term(latents: Tensor, expected: Tensor, weights: LossWeights) -> dict[str, Tensor]:
-    """What keeps visits of one subject together, where it is asked for.
-
-    Args:
-        latents: codes of some shapes, ``[shapes, L]``.
-        expected: the mean code of each one's subject, ``[shapes, L]``.
-        weights: ``visits`` and ``latent_sigma`` are used.
-    """
-    if not weights.visits:
-        return {}
-    return {"visits": weights.visits * losses.visits(latents, expected, weights.latent_sigma)}

@@ -26,13 +26,7 @@ from naisr_model.config import LossWeights, Preset, TrainingConfig
 from naisr_model.data.store import SampleStore
 from naisr_model.errors import Cancelled, InputError
 from naisr_model.files import replacing
-from naisr_model.learning.objective import (
-    Batch,
-    latent_term,
-    population_terms,
-    reconstruction_terms,
-    visits_term,
-)
+from naisr_model.learning.objective import Batch, latent_term, population_terms, reconstruction_terms
 from naisr_model.learning.residual import covariate_basis
 from naisr_model.networks.devices import usable_device
 from naisr_model.networks.naisr import Naisr
@@ -87,7 +81,6 @@ class _Task:
         budget_s: seconds the training may take; infinite when it is bounded by epochs alone.
         rows: the store's training rows, ``[n]``.
         covariates: centred, of those rows, ``[n, N]``.
-        subjects: numbers the subject of each of those rows, ``[n]``.
         basis: orthonormal columns that are taken out of the codes, ``[n, K]``; none when they are free.
         binary: columns of binary covariates.
     """
@@ -98,7 +91,6 @@ class _Task:
     budget_s: float
     rows: NDArray[np.intp]
     covariates: Tensor
-    subjects: Tensor
     basis: Tensor
     binary: tuple[int, ...]
 
@@ -232,7 +224,6 @@ def _task(store: SampleStore, preset: Preset, out: Path, budget_s: float, device
     rows = np.flatnonzero(~store.population.held_out)
     normalised = store.population.normalised()[rows]
     binary = tuple(i for i, c in enumerate(store.population.covariates) if c.kind == "binary")
-    subjects = np.unique(np.array(store.population.subjects)[rows], return_inverse=True)[1]
     basis = covariate_basis(normalised, binary) if preset.training.residual_latents else normalised[:, :0]
     return _Task(
         store=store,
@@ -241,7 +232,6 @@ def _task(store: SampleStore, preset: Preset, out: Path, budget_s: float, device
         budget_s=budget_s,
         rows=rows,
         covariates=torch.as_tensor(normalised, dtype=torch.float32, device=device),
-        subjects=torch.as_tensor(subjects, device=device),
         basis=torch.as_tensor(basis, dtype=torch.float32, device=device),
         binary=binary,
     )
@@ -285,15 +275,13 @@ def _accumulate_gradients(state: _State, task: _Task) -> dict[str, float]:
     _set_rates(state, config, state.share(task))
     state.optimiser.zero_grad()
     batch, covariates = _draw(task, chosen, state.iteration), task.covariates[chosen]
-    everybody = residual_latents(state.codes, task.basis)
+    codes = residual_latents(state.codes, task.basis)[chosen]
     if state.share(task) < config.population_share:
-        everybody = everybody * 0
-    expected = subject_means(everybody.detach(), task.subjects)[chosen]
-    codes = everybody[chosen]
+        codes = codes * 0
     # The codes' gradient is gathered over the parts of the batch and sent through the projection once.
     leaf = codes.detach().requires_grad_()
     sums = accumulate_reconstruction(state.network, batch, covariates, leaf, config.loss)
-    _accumulate(latent_term(leaf, config.loss) | visits_term(leaf, expected, config.loss), 1.0, sums)
+    _accumulate(latent_term(leaf, config.loss), 1.0, sums)
     few = slice(0, POPULATION_SHAPES)
     held = population_terms(state.network, batch.space_points[few], covariates[few], task.binary, config.loss)
     _accumulate(held, 1.0, sums)
@@ -338,12 +326,6 @@ def _judge(total: float, state: _State, task: _Task) -> None:
 def residual_latents(codes: Tensor, basis: Tensor) -> Tensor:
     """The codes ``[n, L]`` less their projection on orthonormal columns ``basis [n, K]``."""
     return codes - basis @ (basis.T @ codes)
-
-
-def subject_means(codes: Tensor, subjects: Tensor) -> Tensor:
-    """For each row of ``codes [n, L]`` the mean over the rows of the same subject; ``subjects [n]``."""
-    total = codes.new_zeros(int(subjects.max()) + 1, codes.shape[1]).index_add(0, subjects, codes)
-    return (total / torch.bincount(subjects)[:, None])[subjects]
 
 
 def _set_rates(state: _State, config: TrainingConfig, share: float) -> None:
