@@ -30,6 +30,7 @@ from naisr_model.learning.posterior import (
     Posterior,
     moved,
     posterior_of,
+    remaining,
     surface_deviations,
     volume_deviation,
 )
@@ -42,7 +43,7 @@ from naisr_model.surface.fields import distances, effect_field, shape_field, tem
 from naisr_model.surface.isosurface import isosurface
 from naisr_model.surface.lattice import Lattice
 from naisr_model.surface.sparse import CHUNK, COARSEST, Field, evaluate_band
-from naisr_model.surface.tracking import Tracker, make_tracker
+from naisr_model.surface.tracking import CodeTracker, FadingTracker, Tracker, make_tracker
 from naisr_model.surface.volume import enclosed_volume
 
 Progress = Callable[[float], None]
@@ -247,7 +248,7 @@ class Atlas:
         code = self._latent(latent)
         return tabulate(self._network, ranges, code, bounds, progress=progress, should_stop=should_stop)
 
-    def tracker(self, template: trimesh.Trimesh, tables: DisplacementTables) -> Tracker:
+    def tracker(self, template: trimesh.Trimesh, tables: DisplacementTables) -> CodeTracker:
         """What carries ``template`` to any covariates in milliseconds, vertex by vertex.
 
         It also makes :meth:`shape` and :meth:`effect` faster.
@@ -386,6 +387,28 @@ class Individual:
             should_stop=should_stop,
         )
 
+    def elsewhere(self, vector: NDArray[np.float64]) -> Individual:
+        """The person at other centred covariates ``[N]``, with what is expected to last of the code.
+
+        How much that is says :func:`~naisr_model.learning.posterior.remaining`.
+        """
+        share = remaining(self.posterior, vector)
+        return Individual(self.atlas, vector, share * self.latent, moved(self.posterior, vector))
+
+    def tracker(self, average: Tracker, own: CodeTracker) -> FadingTracker:
+        """What carries a template to this person :meth:`elsewhere` in milliseconds.
+
+        Args:
+            average: :meth:`Atlas.tracker` of the code 0.
+            own: the same of :attr:`latent`.
+        """
+
+        def share(values: Values) -> float:
+            known = complete(self.atlas.covariates, values, extrapolate=True)
+            return remaining(self.posterior, normalised_vector(self.atlas.covariates, known))
+
+        return FadingTracker(average, own, share)
+
     @cached_property
     def volume_cm3(self) -> float:
         """Volume of the smooth shape; the triangles of :attr:`surface` alone hold a little less."""
@@ -479,6 +502,11 @@ class Fit:
         return {one.name: self._interval(column, one) for column, one in columns if one.name in self.inferred}
 
     @property
+    def lasting(self) -> float:
+        """Share of the code that is kept far from the fitted covariates: what two visits have in common."""
+        return self.individual.posterior.problem.prior.lasting
+
+    @property
     def remarks(self) -> tuple[str, ...]:
         """A sentence on each covariate that the shape does not settle, and on a shape that was missed."""
         sentences = []
@@ -518,15 +546,17 @@ class Fit:
         return self.individual.surface_sd_mm(points_mm)
 
     def at(self, values: Values, *, extrapolate: bool = False) -> Individual:
-        """The same person at other covariates (the paper's shape transfer); the rest stays as fitted.
+        """The same person at other covariates, another day; covariates left out stay as fitted.
+
+        The paper's shape transfer keeps the whole code. Here only what is expected to last from one
+        visit to another is kept of it, see :meth:`Individual.elsewhere`.
 
         Raises:
             InputError: for an unknown covariate or one out of range (unless ``extrapolate``).
         """
-        atlas, person = self.individual.atlas, self.individual
+        atlas = self.individual.atlas
         known = complete(atlas.covariates, {**self.covariates, **values}, extrapolate=extrapolate)
-        vector = normalised_vector(atlas.covariates, known)
-        return Individual(atlas, vector, person.latent, moved(person.posterior, vector))
+        return self.individual.elsewhere(normalised_vector(atlas.covariates, known))
 
     def _real(self, vector: NDArray[np.float64]) -> dict[str, float]:
         pairs = zip(self.individual.atlas.covariates, vector, strict=True)

@@ -56,7 +56,10 @@ CHANGE_HINT = (
     "positive where it has moved outwards."
 )
 
-LATER = "; away from the patient's own covariates the true doubt is larger"
+LATER = (
+    ".\nAway from the patient's own covariates another day is meant: of what sets the patient apart only as "
+    "much is kept as is expected to last"
+)
 
 WORTH_TELLING = 0.05
 """Share of a surface beyond its colour scale from which on that is said."""

@@ -110,6 +110,7 @@ class Clinic:
             volume_cm3=surface.volume_cm3,
             volume_margin_cm3=surface.volume_margin_cm3,
             residual_mm=fit.residual_mm,
+            lasting=fit.lasting,
             seconds=fit.seconds,
             remarks=fit.remarks,
         )

@@ -217,15 +217,31 @@ class Engine:
         if not opened.was_kept:
             self._keep_opening(opened, shown)
         template = trimesh.Trimesh(shown.points_mm, shown.faces, process=False)
+        tracker: Tracker
         if member is None:
-            tables = self._tables(opened, atlas, template, progress, should_stop)
+            tracker = atlas.tracker(template, self._tables(opened, atlas, template, progress, should_stop))
         else:
-            latent = member.fit.latent
-            tables = atlas.tabulate(template, latent, progress=progress, should_stop=should_stop)
-        tracker = atlas.tracker(template, tables)
+            tracker = self._tracker_of(member, template, progress, should_stop)
         with self._lock:
             if self._opened.get(path) is opened and (not person or person in self._members):
                 self._previews.keep(path, person, tracker)
+
+    def _tracker_of(
+        self,
+        member: Member,
+        template: trimesh.Trimesh,
+        progress: Progress | None,
+        should_stop: ShouldStop | None,
+    ) -> Tracker:
+        """Of someone who was fitted, which needs the average's."""
+        path, person = member.atlas, member.fit.individual
+        if not self.has_previews(path):
+            self._prepare(path, 0, None, should_stop)
+        _, _, average = self._who(path, 0)
+        if average is None:
+            raise Cancelled
+        tables = person.atlas.tabulate(template, person.latent, progress=progress, should_stop=should_stop)
+        return person.tracker(average, person.atlas.tracker(template, tables))
 
     def has_previews(self, path: Path, person: int = 0) -> bool:
         """Whether :meth:`prepare_previews` is done for a person."""
@@ -299,7 +315,7 @@ class Engine:
             return replace(self._previews.surface(request, question, tracker), request=request)
         atlas = self.atlas(request.atlas)
         start = time.perf_counter()
-        latent = None if member is None else member.fit.latent
+        latent = None if member is None else member.at(question.values).latent
         mesh = surfaces.mesh(atlas, question, latent, tracker, progress, should_stop)
         if should_stop is not None and should_stop():
             raise Cancelled

@@ -47,8 +47,8 @@ class Member:
 
 def distances(member: Member, values: Named) -> Colouring:
     """How far the scan is from the person's shape at ``values``, at its vertices; positive outside."""
-    atlas = member.fit.individual.atlas
-    found = atlas.sdf(member.scan.points_mm, dict(values), member.fit.latent)
+    atlas, latent = member.fit.individual.atlas, member.at(values).latent
+    found = atlas.sdf(member.scan.points_mm, dict(values), latent)
     limit_mm = rounded(DISTANCE_SHARE * atlas.frame.scale_mm)
     return Colouring(found.astype(np.float32), limit_mm, is_signed=True)
 

@@ -84,6 +84,7 @@ class Fitted:
         volume_cm3: of the fitted shape.
         volume_margin_cm3: half of its 95 % interval; None where the shape is the template.
         residual_mm: mean distance of the scan to the fitted surface.
+        lasting: share of what sets the person apart that is kept at other covariates.
         seconds: what the fit took.
         remarks: what the shape does not settle, a sentence each.
     """
@@ -94,6 +95,7 @@ class Fitted:
     volume_cm3: float
     volume_margin_cm3: float | None
     residual_mm: float
+    lasting: float
     seconds: float
     remarks: tuple[str, ...] = ()
 

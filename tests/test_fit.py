@@ -245,6 +245,37 @@ def test_the_person_at_other_covariates(atlas, made):
         fit.at({"age": 99})
 
 
+def test_what_lasts_of_codes_is_their_correlation_between_visits(atlas):
+    count = int((~atlas.population.held_out).sum())
+    subjects = np.array([f"S{row}" for row in range(len(atlas.population.subjects))])
+    rows = np.flatnonzero(~atlas.population.held_out)[: 2 * (count // 2)]
+    subjects[rows[1::2]] = subjects[rows[::2]]
+    paired = dataclasses.replace(atlas.population, subjects=tuple(subjects))
+    rng = np.random.default_rng(0)
+    own = np.repeat(rng.normal(size=(count // 2 + 1, 400)), 2, axis=0)[:count]  # 400 directions to average
+    for lasting in (0.0, 0.3, 0.8, 1.0):
+        visit = rng.normal(size=own.shape)
+        codes = np.sqrt(lasting) * own + np.sqrt(1 - lasting) * visit
+        assert prior_of(paired, codes.astype(np.float32)).lasting == pytest.approx(lasting, abs=0.05)
+
+
+def test_on_another_day_a_person_is_nearer_the_average_and_less_sure(atlas, made):
+    values, _, shape = made
+    person = atlas.fit(shape, values).individual
+    prior = dataclasses.replace(person.posterior.problem.prior, lasting=0.3)
+    problem = dataclasses.replace(person.posterior.problem, prior=prior)
+    person = dataclasses.replace(person, posterior=dataclasses.replace(person.posterior, problem=problem))
+    here, near, far = (person.elsewhere(person.vector + np.array([step, 0.0])) for step in (0.0, 0.05, 3.0))
+    assert np.array_equal(here.latent, person.latent) and here.posterior is person.posterior
+    assert far.latent == pytest.approx(0.3 * person.latent)
+    shares = [np.linalg.norm(one.latent) / np.linalg.norm(person.latent) for one in (here, near, far)]
+    assert shares[0] > shares[1] > shares[2]
+    expected = 0.09 * person.posterior.covariance + 0.91 * np.eye(len(person.latent))
+    assert far.posterior.along == pytest.approx(expected)
+    spreads = [np.trace(one.posterior.along) for one in (here, near, far)]
+    assert spreads[0] < spreads[1] < spreads[2]
+
+
 def test_the_growth_path_follows_the_population(atlas):
     path = growth_path(atlas.population, "age", np.array([2.0, 5.0, 8.0]))
     assert path[:, 0] == pytest.approx([2, 5, 8])
@@ -257,7 +288,7 @@ def test_evolution_and_its_files(atlas, made, tmp_path):
     assert [one.covariates["age"] for one in people] == pytest.approx([6.5, 7.75, 9.0])
     assert all(one.covariates["sex"] == 1 for one in people)
     only = along_only(fit, "age", np.array([8.0]))[0]
-    effect = atlas.effect("age", 8.0, fit.latent, 32)
+    effect = atlas.effect("age", 8.0, only.latent, 32)
     assert only.shape(32).volume == pytest.approx(effect.volume, rel=1e-4)
     records = write_series(tmp_path, people[:1])
     assert {path.name for path in tmp_path.iterdir()} == {"shape01.stl", "volumes.csv", "shapes.png"}
@@ -301,7 +332,9 @@ def test_the_command_tells_what_python_tells(atlas, egg_atlas, patient, tmp_path
 def test_transfer_and_evolve_write_shapes_and_tables(egg_atlas, patient, tmp_path, capsys):
     given = [str(patient), "--atlas", str(egg_atlas), "--known", "age=6.5,sex=M", "--out", str(tmp_path)]
     assert cli.main(["transfer", *given, "--to", "age=8"]) == 0
-    assert "8 years, M:" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "8 years, M:" in said
+    assert "kept away from the patient's covariates: 90% of what" in said  # nobody was seen twice
     assert len((tmp_path / "volumes.csv").read_text().splitlines()) == 3
     ways = ["--from", "3", "--to", "4", "--steps", "3", "--path", "only"]
     assert cli.main(["evolve", *given, *ways]) == 0

@@ -78,8 +78,11 @@ def test_other_visits_and_other_covariates_are_predicted(families):
         assert case["values"]["sex"] == case["fitted_values"]["sex"]
         assert case["values"]["age"] != case["fitted_values"]["age"]
         assert case["given"]["volume_cm3"] == pytest.approx(true_cm3, rel=0.12)
-        assert case["average"]["interval_cm3"] is None
-    assert 0 <= elsewhere["given"]["held"] <= 1 and elsewhere["average"]["held"] is None
+        assert case["average"]["interval_cm3"] is None and case["kept"]["interval_cm3"] is None
+        volumes = sorted(case[way]["volume_cm3"] for way in ("kept", "average"))
+        assert 0.99 * volumes[0] < case["given"]["volume_cm3"] < 1.01 * volumes[1]
+    assert 0 <= elsewhere["given"]["held"] <= 1
+    assert elsewhere["average"]["held"] is None and elsewhere["kept"]["held"] is None
     assert elsewhere["inferred"]["n"] == elsewhere["n"]
     assert json.loads(json.dumps(report)) == report
     text = transfer.transfer_markdown(report, PUBLISHED_AIRWAY_TRANSFER)

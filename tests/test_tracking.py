@@ -23,9 +23,12 @@ from naisr_model.surface.displacements import (
 from naisr_model.surface.fields import shape_field
 from naisr_model.surface.lattice import Lattice
 from naisr_model.surface.sparse import evaluate_band
-from naisr_model.surface.tracking import RESOLVED, Tracker
+from naisr_model.surface.tracking import RESOLVED, CodeTracker, FadingTracker, Tracker
 
 VOXEL = 2 / 128
+
+OUTSTANDING = 8.0
+"""As many times a training code: some voxels from the average."""
 
 
 @pytest.fixture(scope="module")
@@ -144,6 +147,30 @@ def test_surfaces_are_the_same_with_and_without_a_tracker(atlas, tracker, latent
     ):
         assert one.faces.tolist() == other.faces.tolist()
         assert np.abs(one.vertices - other.vertices).max() < 1e-5 * 2 * atlas.frame.scale_mm
+
+
+@pytest.fixture(scope="module")
+def own(atlas: Atlas, template: trimesh.Trimesh) -> CodeTracker:
+    code = OUTSTANDING * atlas.checkpoint.latents[0]
+    return atlas.tracker(template, atlas.tabulate(template, code))
+
+
+@pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
+def test_a_share_of_a_person_is_carried_to_the_surface_of_that_share_of_the_code(atlas, tracker, own, share):
+    values = {"age": 7.5, "sex": 1.0}
+    fading = FadingTracker(tracker, own, lambda _: share)
+    code = share * OUTSTANDING * atlas.checkpoint.latents[0]
+    exact, tracked = atlas.shape(values, code, 128), fading.track(values)
+    squared_mm2, _, _ = igl.point_mesh_squared_distance(
+        tracked.points_mm.astype(float), exact.vertices, np.asarray(exact.faces)
+    )
+    assert np.sqrt(squared_mm2).mean() < 0.25 * VOXEL * atlas.frame.scale_mm
+    assert np.linalg.norm(tracked.normals, axis=1) == pytest.approx(1, abs=1e-5)
+    assert tracked.is_trustworthy
+    faster = atlas.shape(values, code, 128, tracker=fading)
+    assert faster.faces.tolist() == exact.faces.tolist()
+    away_mm = np.abs(own.track(values).points_mm - tracker.track(values).points_mm).max()
+    assert away_mm > VOXEL * atlas.frame.scale_mm  # the person does differ from the average
 
 
 def test_where_it_starts_does_not_matter(tracker):

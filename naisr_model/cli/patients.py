@@ -74,12 +74,12 @@ def transfer(
     out: Annotated[Path | None, Parameter(help="folder for both surfaces, a table and a picture.")] = None,
     json_file: JsonFile = None,
 ) -> None:
-    """Show a patient's shape at other covariates, what makes the patient an individual kept."""
+    """Show a patient's shape at other covariates, with what lasts of what sets the patient apart."""
     from naisr_model.evaluation.evolution import parsed
 
     fitted, intake = _fitted(patient, atlas, reading)
     moved = fitted.at(parsed(fitted.individual.atlas, pairs("--to", to)))
-    _tell_series(intake, [fitted.individual, moved], out, json_file)
+    _tell_series(fitted, intake, [fitted.individual, moved], out, json_file)
 
 
 def evolve(
@@ -109,7 +109,7 @@ def evolve(
     from naisr_model.evaluation.evolution import evolution
 
     fitted, intake = _fitted(patient, atlas, reading)
-    _tell_series(intake, evolution(fitted, along, start, stop, steps, path), out, json_file)
+    _tell_series(fitted, intake, evolution(fitted, along, start, stop, steps, path), out, json_file)
 
 
 def _fitted(patient: Path, atlas: Path, reading: Reading) -> tuple[Any, Any]:
@@ -146,7 +146,9 @@ def _tell_fit(fitted: Any, alternatives: Sequence[Mapping[str, Any]]) -> None:
         print(sentence)
 
 
-def _tell_series(intake: Any, people: Sequence[Any], out: Path | None, json_file: Path | None) -> None:
+def _tell_series(
+    fitted: Any, intake: Any, people: Sequence[Any], out: Path | None, json_file: Path | None
+) -> None:
     from naisr_model.evaluation.evolution import write_series
 
     with bar("measuring") as progress, stoppable() as stop:
@@ -155,4 +157,5 @@ def _tell_series(intake: Any, people: Sequence[Any], out: Path | None, json_file
         where = ", ".join(c.format(person.covariates[c.name]) for c in person.atlas.covariates)
         low, high = record["volume_low_cm3"], record["volume_high_cm3"]
         print(f"{where}: {record['volume_cm3']:.1f} cm³ ({low:.1f} to {high:.1f})")
-    write_json(json_file, {"patient": intake.to_json(), "shapes": records})
+    print(f"kept away from the patient's covariates: {fitted.lasting:.0%} of what sets the patient apart")
+    write_json(json_file, {"patient": intake.to_json(), "lasting": fitted.lasting, "shapes": records})

@@ -17,7 +17,6 @@ from naisr_model.atlas import Atlas, Fit, Individual
 from naisr_model.covariates import complete, growth_path
 from naisr_model.errors import Cancelled, InputError
 from naisr_model.files import replacing
-from naisr_model.learning.posterior import moved
 
 Progress = Callable[[float], None]
 StopCheck = Callable[[], bool]
@@ -34,6 +33,7 @@ def fit_record(fit: Fit) -> dict[str, Any]:
         "alternatives": [dataclasses.asdict(one) for one in fit.alternatives],
         "remarks": list(fit.remarks),
         "residual_mm": fit.residual_mm,
+        "lasting": fit.lasting,
         "volume_cm3": fit.volume_cm3,
         "volume_interval_cm3": list(fit.volume_interval_cm3),
         "seconds": fit.seconds,
@@ -91,14 +91,14 @@ def along_population(fit: Fit, name: str, values: NDArray[np.float64]) -> list[I
 
 def along_only(fit: Fit, name: str, values: NDArray[np.float64]) -> list[Individual]:
     """Phi_i of the patient: one covariate moves, the others are at the population centre."""
-    atlas, person = fit.individual.atlas, fit.individual
+    atlas = fit.individual.atlas
     column = atlas.population.names.index(name)
     result = []
     for value in values:
         complete(atlas.covariates, {name: float(value)})
         vector = np.zeros(len(atlas.covariates))
         vector[column] = float(atlas.covariates[column].normalise(value))
-        result.append(Individual(atlas, vector, person.latent, moved(person.posterior, vector)))
+        result.append(fit.individual.elsewhere(vector))
     return result
 
 

@@ -48,6 +48,7 @@ StopCheck = Callable[[], bool]
 WAYS = {
     "given": "fitted, covariates given",
     "inferred": "fitted, covariates inferred",
+    "kept": "fitted, covariates given, the whole code kept as in the paper",
     "average": "no fit: the population's average at the same covariates",
 }
 QUESTIONS = {"visits": "Other visits", "counterfactuals": "Same person, other covariates"}
@@ -62,7 +63,7 @@ class Prediction:
     Attributes:
         distances: from the truth; None where nothing was predicted.
         volume_cm3: predicted.
-        interval_cm3: of the volume, 95 %; None of the average.
+        interval_cm3: of the volume, 95 %; None where there is none.
     """
 
     distances: Distances | None
@@ -93,9 +94,10 @@ def transfer(
 ) -> dict[str, Any]:
     """Fit each held-out subject's first visit and predict the others, and the same person elsewhere.
 
-    A fit is shown at the other covariates themselves, whether its own were given or inferred. (The paper adds
-    the change of the covariates to the inferred ones; where a shape hardly tells the age, as that of a
-    grown-up does, this carries the error of the inferred age along.) In the second question the covariates
+    A fit is shown at the other covariates themselves, whether its own were given or inferred, with what is
+    expected to last of its code; beside it stands the paper's transfer, which keeps the whole code. (To
+    inferred covariates the paper adds the change of the true ones; where a shape hardly tells it, as that
+    of a grown-up does, this carries the error of the age along.) In the second question the covariates
     are those of the next held-out subject with the same binary ones, so that they are plausible together;
     the truth is what the synthetic population makes of the fitted visit's own variation at them. Subjects
     whose first visit is outside the observed ranges are left out.
@@ -182,8 +184,11 @@ def _case(
     atlas: Atlas, seen: HeldOut, truth: HeldOut, fits: Sequence[Fit], should_stop: StopCheck | None
 ) -> Case:
     given, inferred = (_predicted(fit.at(truth.values, extrapolate=True), truth, should_stop) for fit in fits)
-    average = _measured(atlas.shape(truth.values, extrapolate=True, should_stop=should_stop), None, truth)
-    return Case(seen, truth, {"given": given, "inferred": inferred, "average": average})
+    kept, average = (
+        _measured(atlas.shape(truth.values, code, extrapolate=True, should_stop=should_stop), None, truth)
+        for code in (fits[0].latent, None)
+    )
+    return Case(seen, truth, dict(zip(WAYS, (given, inferred, kept, average), strict=True)))
 
 
 def _predicted(person: Individual, truth: HeldOut, should_stop: StopCheck | None) -> Prediction:
@@ -201,8 +206,8 @@ def _record(cases: Sequence[Case]) -> dict[str, Any]:
     ways = {}
     for way in WAYS:
         found = [case.ways[way].distances for case in cases]
-        held = float(np.mean([case.ways[way].holds(_volume_cm3(case.truth)) for case in cases]))
-        ways[way] = {**summary([one for one in found if one]), "held": None if way == "average" else held}
+        held = [one.holds(_volume_cm3(case.truth)) for case in cases if (one := case.ways[way]).interval_cm3]
+        ways[way] = {**summary([one for one in found if one]), "held": float(np.mean(held)) if held else None}
     people = len({case.seen.subject for case in cases})
     return {"n": len(cases), "subjects": people, **ways, "cases": [_case_record(case) for case in cases]}
 

@@ -19,6 +19,9 @@ WIDENING = 2.0
 """Standard deviation of an unseen shape's code over that of the training codes, to which the networks
 were fitted. Calibrated together with ``fit.INDEPENDENT_POINTS``."""
 
+UNSEEN_LASTING = 0.9
+"""Taken for the correlation of two visits' codes where nobody was seen twice; a choice."""
+
 
 @dataclass(frozen=True, eq=False)
 class Prior:
@@ -31,7 +34,7 @@ class Prior:
         lowest: smallest observed centred covariates, ``[N]``.
         highest: largest ones, ``[N]``.
         training: centred covariates of the training rows, ``[n_train, N]``.
-        change: variance of a whitened code, along each axis, between two visits of one person.
+        lasting: correlation of the codes of two visits of one person, 0 to 1.
     """
 
     code_root: NDArray[np.float64]
@@ -40,36 +43,36 @@ class Prior:
     lowest: NDArray[np.float64]
     highest: NDArray[np.float64]
     training: NDArray[np.float64]
-    change: float
+    lasting: float
 
 
 def prior_of(population: Population, latents: NDArray[np.float32]) -> Prior:
     """The prior of a population and its training codes ``[n_train, L]``."""
     rows = population.normalised()[~population.held_out]
     bounds = np.array([c.normalise(c.range) for c in population.covariates])
-    root = _root(latents.astype(np.float64))
     subjects = np.array(population.subjects)[~population.held_out]
     return Prior(
-        code_root=root,
+        code_root=_root(latents.astype(np.float64)),
         mean=rows.mean(axis=0),
         covariance=np.atleast_2d(np.cov(rows, rowvar=False)) + 1e-6 * np.eye(rows.shape[1]),
         lowest=bounds[:, 0],
         highest=bounds[:, 1],
         training=rows,
-        change=_change(np.asarray(np.linalg.solve(root, latents.T).T, np.float64), subjects),
+        lasting=_lasting(latents.astype(np.float64), subjects),
     )
 
 
-def _change(codes: NDArray[np.float64], subjects: NDArray[np.str_]) -> float:
-    """Mean square of the difference of two visits' whitened codes ``[n, L]``, along each axis.
+def _lasting(codes: NDArray[np.float64], subjects: NDArray[np.str_]) -> float:
+    """Intraclass correlation of codes ``[n, L]``, whose average is 0, over all their directions.
 
-    Where nobody was seen twice, nothing is known of how long a code lasts: then it is that of strangers.
+    It is 1 less the variance within a subject as a share of the whole.
     """
-    first, second = np.triu_indices(len(codes), 1)
-    same = subjects[first] == subjects[second]
-    if same.any():
-        return float(np.mean((codes[first[same]] - codes[second[same]]) ** 2))
-    return 2 * float(np.mean(codes**2))
+    _, own, visits = np.unique(subjects, return_inverse=True, return_counts=True)
+    if visits.max() == 1:
+        return UNSEEN_LASTING
+    means = np.stack([codes[own == number].mean(axis=0) for number in range(len(visits))])
+    within = np.sum((codes - means[own]) ** 2) / np.sum(visits - 1)
+    return float(np.clip(1 - within / np.mean(np.sum(codes**2, axis=1)), 0, 1))
 
 
 def _root(latents: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -13,7 +13,9 @@ exact surface is found sooner.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import torch
@@ -47,6 +49,10 @@ TEMPLATE_LATTICE = Lattice(128)
 """Where T is tabulated."""
 
 
+Displacement = Callable[[Tensor], Tensor]
+"""d of points ``[3, n]``, ``[3, n]``, model units."""
+
+
 @dataclass(frozen=True, eq=False)
 class Tracked:
     """The template's surface carried to a shape.
@@ -70,9 +76,34 @@ class Tracked:
         return not (self.folds or self.lost)
 
 
+class Tracker(Protocol):
+    """Carries one template surface to any covariates.
+
+    Values are real ones by name; what is left out is at the centre, so that a single one gives Phi_i.
+    All methods raise :class:`InputError` for an unknown covariate.
+    """
+
+    @property
+    def faces(self) -> NDArray[np.int64]:
+        """Vertex numbers of the triangles, ``[m, 3]``; the same for every shape."""
+
+    def track(self, values: Values, start: Tracked | None = None) -> Tracked:
+        """Carry the template to ``values``; from a shape nearby, ``start``, in fewer steps.
+
+        Raises:
+            InputError: also for a value out of range.
+        """
+
+    def displacement(self, values: Values) -> Displacement:
+        """The sum d by interpolation; the further out of range, the worse."""
+
+    def guess(self, values: Values) -> Field:
+        """T(p + d(p)) by interpolation: near the surface within a fraction of a voxel, at next to no work."""
+
+
 @dataclass(frozen=True, eq=False)
-class Tracker:
-    """Carries one template surface to any covariates, at one code.
+class CodeTracker:
+    """A :class:`Tracker` at one code.
 
     Attributes:
         covariates: of the atlas.
@@ -93,16 +124,7 @@ class Tracker:
     faces: NDArray[np.int64]
 
     def track(self, values: Values, start: Tracked | None = None) -> Tracked:
-        """Carry the template to ``values``.
-
-        Args:
-            values: real values by name; what is left out is at the centre, so that a single one gives
-                Phi_i.
-            start: a shape nearby, from which fewer steps are needed.
-
-        Raises:
-            InputError: for an unknown covariate or one out of range.
-        """
+        """As :meth:`Tracker.track`."""
         vector = normalised_vector(self.covariates, complete(self.covariates, values))
         first = self.template_points if start is None else _rows(self.frame.to_model(start.points_mm))
         with torch.inference_mode():
@@ -115,25 +137,65 @@ class Tracker:
         points_mm = self.frame.to_mm(_columns(points)).astype(np.float32)
         return Tracked(points_mm, _columns(normals), float((error > RESOLVED).float().mean()), folds)
 
-    def guess(self, values: Values) -> Field:
-        """T(p + d(p)) by interpolation: near the surface within a fraction of a voxel, and next to no work.
-
-        Args:
-            values: real values by name, as for :meth:`track`; the further out of range, the worse.
-
-        Raises:
-            InputError: for an unknown covariate.
-        """
+    def displacement(self, values: Values) -> Displacement:
+        """As :meth:`Tracker.displacement`."""
         vector = normalised_vector(self.covariates, complete(self.covariates, values, extrapolate=True))
-        displacement, lower = self.displacements.at(vector), self.displacements.lower
+        field, lower = self.displacements.at(vector), self.displacements.lower
+        return lambda points: sample(field, lower, points)
 
-        def field(points: NDArray[np.float32]) -> NDArray[np.float32]:
-            located = _rows(points)
-            landed = located + sample(displacement, lower, located)
-            found = sample(self.template_values, -torch.ones(3), landed, TEMPLATE_LATTICE.spacing)
-            return found[0].numpy()
+    def guess(self, values: Values) -> Field:
+        """As :meth:`Tracker.guess`."""
+        return _composed(self.template_values, self.displacement(values))
 
-        return field
+
+@dataclass(frozen=True, eq=False)
+class FadingTracker:
+    """A :class:`Tracker` of a person of whose code a share counts that depends on the covariates.
+
+    The displacements are so nearly linear in the code that the shape of a share of it stands, vertex by
+    vertex, at that share of the way from the average's shape to the whole code's.
+
+    Attributes:
+        average: of the code 0.
+        own: of the whole code, and of the same template.
+        share: of the code, by real covariate values, 0 to 1.
+    """
+
+    average: Tracker
+    own: CodeTracker
+    share: Callable[[Values], float]
+
+    @property
+    def faces(self) -> NDArray[np.int64]:
+        """As :attr:`Tracker.faces`."""
+        return self.own.faces
+
+    def track(self, values: Values, start: Tracked | None = None) -> Tracked:
+        """As :meth:`Tracker.track`."""
+        share, own = self.share(values), self.own.track(values, start)
+        if share == 1:
+            return own
+        average = self.average.track(values, start)
+        normals = _between(average.normals, own.normals, share)
+        return Tracked(
+            _between(average.points_mm, own.points_mm, share),
+            normals / np.linalg.norm(normals, axis=1, keepdims=True).clip(min=1e-12),
+            lost=max(average.lost, own.lost),
+            folds=average.folds or own.folds,
+        )
+
+    def displacement(self, values: Values) -> Displacement:
+        """As :meth:`Tracker.displacement`."""
+        share, average, own = (
+            self.share(values),
+            self.average.displacement(values),
+            self.own.displacement(values),
+        )
+        return lambda points: torch.lerp(average(points), own(points), share)
+
+    def guess(self, values: Values) -> Field:
+        """As :meth:`Tracker.guess`."""
+        return _composed(self.own.template_values, self.displacement(values))
 
 
 def make_tracker(
@@ -142,7 +204,7 @@ def make_tracker(
     frame: Frame,
     template_mm: trimesh.Trimesh,
     tables: DisplacementTables,
-) -> Tracker:
+) -> CodeTracker:
     """A tracker of the surface ``template_mm`` of T.
 
     Args:
@@ -156,7 +218,7 @@ def make_tracker(
     located = points[None].requires_grad_()
     (slopes,) = torch.autograd.grad(network.template(located).sum(), located)
     values = continued(evaluate_band(template_field(network), TEMPLATE_LATTICE), TEMPLATE_LATTICE)
-    return Tracker(
+    return CodeTracker(
         covariates,
         frame,
         Displacements(tables),
@@ -182,6 +244,21 @@ def _solve(field: Tensor, lower: Tensor, targets: Tensor, points: Tensor) -> tup
             return points, found[3:], error
         points = points + _shortened(_solved(_matrix(found[3:]), missing))
         steps += 1
+
+
+def _composed(template_values: Tensor, displacement: Displacement) -> Field:
+    """T(p + d(p)) with T by interpolation."""
+
+    def field(points: NDArray[np.float32]) -> NDArray[np.float32]:
+        located = _rows(points)
+        landed = located + displacement(located)
+        return sample(template_values, -torch.ones(3), landed, TEMPLATE_LATTICE.spacing)[0].numpy()
+
+    return field
+
+
+def _between(first: NDArray[np.float32], second: NDArray[np.float32], share: float) -> NDArray[np.float32]:
+    return first + np.float32(share) * (second - first)
 
 
 def _matrix(slopes: Tensor) -> tuple[Tensor, Tensor, Tensor]:

@@ -170,7 +170,7 @@ def test_another_atlas_replaces_the_rows(panel, card, qtbot):
 def with_fit(card: AtlasCard) -> ExplorerState:
     """A girl whose age and sex are known and whose weight was inferred."""
     values = (("age", 84.0), ("weight", 21.34), ("sex", -1.0))
-    fit = Fitted(1, values, (("weight", 18.2, 34.9),), 48.0, 3.0, residual_mm=0.4, seconds=2.0)
+    fit = Fitted(1, values, (("weight", 18.2, 34.9),), 48.0, 3.0, residual_mm=0.4, lasting=0.4, seconds=2.0)
     points_mm, faces = np.zeros((3, 3), np.float32), np.zeros((0, 3), np.int64)
     scan = Scan(points_mm, points_mm, faces, "p01.stl")
     patient = Patient(1, "p01.stl", Reading(Path("p01.stl")), scan, (("age", 84.0), ("sex", -1.0)), fit)

@@ -40,6 +40,7 @@ FIT = Fitted(
     volume_cm3=48.31,
     volume_margin_cm3=2.13,
     residual_mm=0.312,
+    lasting=0.36,
     seconds=2.31,
     remarks=("the shape does not tell sex: both levels explain it",),
 )

@@ -79,7 +79,7 @@ def patient(key: int, known: Named = (), person: int = 0, age: float = 84.0) -> 
     none = np.zeros((0, 3), np.float32)
     scan = Scan(none, none, none.astype(np.int64), "p.stl")
     values = (("age", age), ("weight", 20.0), ("sex", 1.0))
-    fit = Fitted(person, values, (("weight", 18.0, 22.0),), 48.0, 2.0, 0.3, 1.0) if person else None
+    fit = Fitted(person, values, (("weight", 18.0, 22.0),), 48.0, 2.0, 0.3, 0.4, 1.0) if person else None
     return Patient(key, f"p{key}.stl", Reading(Path(f"p{key}.stl")), scan, known, fit)
 
 
