@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -29,6 +30,7 @@ from naisr_model.learning.posterior import (
     TWO_SIDED_95,
     Posterior,
     moved,
+    nearness,
     posterior_of,
     remaining,
     surface_deviations,
@@ -38,7 +40,7 @@ from naisr_model.learning.prior import Prior, places_of, prior_of
 from naisr_model.learning.target import target_of
 from naisr_model.networks.devices import usable_device
 from naisr_model.networks.naisr import Naisr
-from naisr_model.surface.displacements import DisplacementTables, tabulate
+from naisr_model.surface.displacements import Displacements, DisplacementTables, tabulate
 from naisr_model.surface.fields import distances, effect_field, shape_field, template_field
 from naisr_model.surface.isosurface import isosurface
 from naisr_model.surface.lattice import Lattice
@@ -395,19 +397,38 @@ class Individual:
         share = remaining(self.posterior, vector)
         return Individual(self.atlas, vector, share * self.latent, moved(self.posterior, vector))
 
-    def tracker(self, average: Tracker, own: CodeTracker) -> FadingTracker:
-        """What carries a template to this person :meth:`elsewhere` in milliseconds.
+    def tracker(
+        self,
+        template: trimesh.Trimesh,
+        *,
+        progress: Progress | None = None,
+        should_stop: StopCheck | None = None,
+    ) -> FadingTracker:
+        """What carries a template to this person :meth:`elsewhere` in milliseconds; takes seconds.
 
         Args:
-            average: :meth:`Atlas.tracker` of the code 0.
-            own: the same of :attr:`latent`.
+            template: a mesh that :meth:`Atlas.template` gave.
+            progress: told the finished share.
+            should_stop: polled between chunks of points.
+
+        Raises:
+            Cancelled: when ``should_stop()`` turned true.
         """
+        atlas, lasting = self.atlas, self.posterior.problem.prior.lasting
+        codes = (lasting * self.latent, self.latent)
+        far, near = (
+            atlas.tabulate(template, code, progress=_half(progress, number), should_stop=should_stop)
+            for number, code in enumerate(codes)
+        )
+        tracker = atlas.tracker(template, far)
 
-        def share(values: Values) -> float:
-            known = complete(self.atlas.covariates, values, extrapolate=True)
-            return remaining(self.posterior, normalised_vector(self.atlas.covariates, known))
+        def nearness_of(values: Values) -> float:
+            known = complete(atlas.covariates, values, extrapolate=True)
+            return nearness(self.posterior, normalised_vector(atlas.covariates, known))
 
-        return FadingTracker(average, own, share)
+        return FadingTracker(
+            tracker, dataclasses.replace(tracker, displacements=Displacements(near)), nearness_of
+        )
 
     @cached_property
     def volume_cm3(self) -> float:
@@ -581,3 +602,8 @@ class Fit:
         ends = np.interp([TAIL, 1 - TAIL], np.cumsum(self._shares @ densities), places)
         low, high = covariate.restore(ends).tolist()
         return low, high
+
+
+def _half(progress: Progress | None, number: int) -> Progress | None:
+    """Progress of the first or the second of two pieces as progress of both."""
+    return None if progress is None else lambda share: progress((number + share) / 2)

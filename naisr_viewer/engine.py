@@ -221,27 +221,11 @@ class Engine:
         if member is None:
             tracker = atlas.tracker(template, self._tables(opened, atlas, template, progress, should_stop))
         else:
-            tracker = self._tracker_of(member, template, progress, should_stop)
+            someone = member.fit.individual
+            tracker = someone.tracker(template, progress=progress, should_stop=should_stop)
         with self._lock:
             if self._opened.get(path) is opened and (not person or person in self._members):
                 self._previews.keep(path, person, tracker)
-
-    def _tracker_of(
-        self,
-        member: Member,
-        template: trimesh.Trimesh,
-        progress: Progress | None,
-        should_stop: ShouldStop | None,
-    ) -> Tracker:
-        """Of someone who was fitted, which needs the average's."""
-        path, person = member.atlas, member.fit.individual
-        if not self.has_previews(path):
-            self._prepare(path, 0, None, should_stop)
-        _, _, average = self._who(path, 0)
-        if average is None:
-            raise Cancelled
-        tables = person.atlas.tabulate(template, person.latent, progress=progress, should_stop=should_stop)
-        return person.tracker(average, person.atlas.tracker(template, tables))
 
     def has_previews(self, path: Path, person: int = 0) -> bool:
         """Whether :meth:`prepare_previews` is done for a person."""

@@ -150,15 +150,15 @@ def test_surfaces_are_the_same_with_and_without_a_tracker(atlas, tracker, latent
 
 
 @pytest.fixture(scope="module")
-def own(atlas: Atlas, template: trimesh.Trimesh) -> CodeTracker:
+def outstanding(atlas: Atlas, template: trimesh.Trimesh) -> CodeTracker:
     code = OUTSTANDING * atlas.checkpoint.latents[0]
     return atlas.tracker(template, atlas.tabulate(template, code))
 
 
-@pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
-def test_a_share_of_a_person_is_carried_to_the_surface_of_that_share_of_the_code(atlas, tracker, own, share):
+@pytest.mark.parametrize("share", [0.0, 0.001, 0.4, 1.0])
+def test_between_two_codes_stands_the_surface_of_the_code_between(atlas, tracker, outstanding, share):
     values = {"age": 7.5, "sex": 1.0}
-    fading = FadingTracker(tracker, own, lambda _: share)
+    fading = FadingTracker(tracker, outstanding, lambda _: share)
     code = share * OUTSTANDING * atlas.checkpoint.latents[0]
     exact, tracked = atlas.shape(values, code, 128), fading.track(values)
     squared_mm2, _, _ = igl.point_mesh_squared_distance(
@@ -169,8 +169,23 @@ def test_a_share_of_a_person_is_carried_to_the_surface_of_that_share_of_the_code
     assert tracked.is_trustworthy
     faster = atlas.shape(values, code, 128, tracker=fading)
     assert faster.faces.tolist() == exact.faces.tolist()
-    away_mm = np.abs(own.track(values).points_mm - tracker.track(values).points_mm).max()
-    assert away_mm > VOXEL * atlas.frame.scale_mm  # the person does differ from the average
+    away_mm = np.abs(outstanding.track(values).points_mm - tracker.track(values).points_mm).max()
+    assert away_mm > VOXEL * atlas.frame.scale_mm  # or there would be nothing between
+
+
+def test_a_fitted_person_is_carried_elsewhere(atlas, template):
+    home, elsewhere = {"age": 6.5, "sex": 1.0}, {"age": 3.0, "sex": -1.0}
+    fit = atlas.fit(atlas.shape(home, OUTSTANDING * atlas.checkpoint.latents[0], 64), home)
+    told: list[float] = []
+    tracker = fit.individual.tracker(template, progress=told.append)
+    assert told == sorted(told) and told[-1] == 1
+    assert tracker.nearness(home) == 1 and tracker.nearness(elsewhere) < 0.01
+    for values in (home, elsewhere):
+        exact = fit.at(values).shape(128)
+        squared_mm2, _, _ = igl.point_mesh_squared_distance(
+            tracker.track(values).points_mm.astype(float), exact.vertices, np.asarray(exact.faces)
+        )
+        assert np.sqrt(squared_mm2).mean() < 0.25 * VOXEL * atlas.frame.scale_mm
 
 
 def test_where_it_starts_does_not_matter(tracker):

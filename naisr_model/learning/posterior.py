@@ -98,7 +98,12 @@ def remaining(posterior: Posterior, covariates: Vector) -> float:
     linear prediction of one visit from another.
     """
     lost = 1 - posterior.problem.prior.lasting
-    return 1 - lost * (1 - float(np.exp(-_away(posterior, covariates) / ONE_DAY)))
+    return 1 - lost * (1 - nearness(posterior, covariates))
+
+
+def nearness(posterior: Posterior, covariates: Vector) -> float:
+    """How nearly other covariates are those of the same day, 0 to 1; exactly 1 at those of the fit."""
+    return float(np.exp(-_away(posterior, covariates) / ONE_DAY))
 
 
 def moved(posterior: Posterior, covariates: Vector) -> Posterior:
@@ -108,12 +113,12 @@ def moved(posterior: Posterior, covariates: Vector) -> Posterior:
     what does not remain of it is as open as that of a stranger. At the covariates of the fit itself nothing
     changes.
     """
-    away, share = _away(posterior, covariates), remaining(posterior, covariates)
-    if away < SAME:
+    share = remaining(posterior, covariates)
+    if _away(posterior, covariates) < SAME:
         return posterior
     count = len(posterior.problem.free)
     here, there = (matrix[count:, count:] for matrix in (posterior.along, posterior.covariance))
-    known = here + (1 - np.exp(-away / ONE_DAY)) * (there - here)
+    known = here + (1 - nearness(posterior, covariates)) * (there - here)
     code = share**2 * known + (1 - share**2) * np.eye(len(here))
     problem = dataclasses.replace(posterior.problem, fixed=covariates)
     return Posterior(covariates, problem, code, code, posterior.noise)

@@ -45,6 +45,9 @@ LONGEST_STEP = 4 * SPACINGS[-1]
 
 STEPS = 20
 
+NEGLIGIBLE = 0.01
+"""Share below which a code does not count beside another."""
+
 TEMPLATE_LATTICE = Lattice(128)
 """Where T is tabulated."""
 
@@ -94,9 +97,6 @@ class Tracker(Protocol):
             InputError: also for a value out of range.
         """
 
-    def displacement(self, values: Values) -> Displacement:
-        """The sum d by interpolation; the further out of range, the worse."""
-
     def guess(self, values: Values) -> Field:
         """T(p + d(p)) by interpolation: near the surface within a fraction of a voxel, at next to no work."""
 
@@ -138,7 +138,7 @@ class CodeTracker:
         return Tracked(points_mm, _columns(normals), float((error > RESOLVED).float().mean()), folds)
 
     def displacement(self, values: Values) -> Displacement:
-        """As :meth:`Tracker.displacement`."""
+        """The sum d by interpolation; the further out of range, the worse."""
         vector = normalised_vector(self.covariates, complete(self.covariates, values, extrapolate=True))
         field, lower = self.displacements.at(vector), self.displacements.lower
         return lambda points: sample(field, lower, points)
@@ -150,52 +150,50 @@ class CodeTracker:
 
 @dataclass(frozen=True, eq=False)
 class FadingTracker:
-    """A :class:`Tracker` of a person of whose code a share counts that depends on the covariates.
+    """A :class:`Tracker` whose code passes from one to another with the covariates.
 
-    The displacements are so nearly linear in the code that the shape of a share of it stands, vertex by
-    vertex, at that share of the way from the average's shape to the whole code's.
+    The displacements are so nearly linear in the code that a shape in between stands, vertex by vertex,
+    between the shapes of both codes.
 
     Attributes:
-        average: of the code 0.
-        own: of the whole code, and of the same template.
-        share: of the code, by real covariate values, 0 to 1.
+        far: of the code far away.
+        near: of the code at home, and of the same template.
+        nearness: share of the latter by real covariate values, 0 to 1.
     """
 
-    average: Tracker
-    own: CodeTracker
-    share: Callable[[Values], float]
+    far: CodeTracker
+    near: CodeTracker
+    nearness: Callable[[Values], float]
 
     @property
     def faces(self) -> NDArray[np.int64]:
         """As :attr:`Tracker.faces`."""
-        return self.own.faces
+        return self.far.faces
 
     def track(self, values: Values, start: Tracked | None = None) -> Tracked:
         """As :meth:`Tracker.track`."""
-        share, own = self.share(values), self.own.track(values, start)
-        if share == 1:
-            return own
-        average = self.average.track(values, start)
-        normals = _between(average.normals, own.normals, share)
+        share = self._share(values)
+        if share in (0.0, 1.0):
+            return (self.near if share else self.far).track(values, start)
+        far, near = (each.track(values, start) for each in (self.far, self.near))
+        normals = _between(far.normals, near.normals, share)
         return Tracked(
-            _between(average.points_mm, own.points_mm, share),
+            _between(far.points_mm, near.points_mm, share),
             normals / np.linalg.norm(normals, axis=1, keepdims=True).clip(min=1e-12),
-            lost=max(average.lost, own.lost),
-            folds=average.folds or own.folds,
+            lost=max(far.lost, near.lost),
+            folds=far.folds or near.folds,
         )
-
-    def displacement(self, values: Values) -> Displacement:
-        """As :meth:`Tracker.displacement`."""
-        share, average, own = (
-            self.share(values),
-            self.average.displacement(values),
-            self.own.displacement(values),
-        )
-        return lambda points: torch.lerp(average(points), own(points), share)
 
     def guess(self, values: Values) -> Field:
         """As :meth:`Tracker.guess`."""
-        return _composed(self.own.template_values, self.displacement(values))
+        share, far, near = self._share(values), self.far.displacement(values), self.near.displacement(values)
+        return _composed(
+            self.far.template_values, lambda points: torch.lerp(far(points), near(points), share)
+        )
+
+    def _share(self, values: Values) -> float:
+        share = self.nearness(values)
+        return share if share > NEGLIGIBLE else 0.0
 
 
 def make_tracker(
