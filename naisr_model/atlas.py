@@ -390,9 +390,10 @@ class Individual:
         )
 
     def elsewhere(self, vector: NDArray[np.float64]) -> Individual:
-        """The person at other centred covariates ``[N]``, with what is expected to last of the code.
+        """A fitted person at other centred covariates ``[N]``, with what is expected to last of the code.
 
-        How much that is says :func:`~naisr_model.learning.posterior.remaining`.
+        How much that is says :func:`~naisr_model.learning.posterior.remaining`. It counts from the fit, so a
+        person who has been moved is not to be moved again.
         """
         share = remaining(self.posterior, vector)
         return Individual(self.atlas, vector, share * self.latent, moved(self.posterior, vector))

@@ -57,8 +57,8 @@ CHANGE_HINT = (
 )
 
 LATER = (
-    ".\nAway from the patient's own covariates another day is meant: of what sets the patient apart only as "
-    "much is kept as is expected to last"
+    "\nAway from the patient's own covariates another day is meant: what sets the patient apart is kept only "
+    "as far as it is expected to last."
 )
 
 WORTH_TELLING = 0.05
@@ -86,8 +86,8 @@ def _measured(result: SurfaceResult) -> tuple[str, str]:
     if result.request.panel.kind == "certainty":
         return _mean_margin(result), CERTAINTY_HINT
     if result.request.panel.kind == "change":
-        return _change(result), CHANGE_HINT
-    within = "" if result.volume_margin_cm3 is None else f", ± half of its 95 % interval{LATER}"
+        return _change(result), CHANGE_HINT + LATER
+    within = "" if result.volume_margin_cm3 is None else f", ± half of its 95 % interval.{LATER}"
     return _large(volume(result.volume_cm3, result.volume_margin_cm3)), f"Enclosed volume{within}"
 
 

@@ -23,7 +23,7 @@ from naisr_viewer.members import Member
 from naisr_viewer.previews import Previews
 from naisr_viewer.requests import (
     EXACT_RESOLUTION,
-    SIGNED,
+    HAS_TWO_SIDES,
     Origin,
     Progress,
     ShouldStop,
@@ -291,7 +291,7 @@ class Engine:
         """
         if (remembered := self.cached(request)) is not None:
             return remembered
-        if request.panel.kind in SIGNED:
+        if request.panel.kind in HAS_TWO_SIDES:
             return self._coloured(request, progress, should_stop)
         opened, member, tracker = self._who(request.atlas, request.person)
         question = simplest(request, opened.card.covariates)

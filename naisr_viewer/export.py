@@ -107,6 +107,7 @@ def _patient_record(patient: Patient) -> dict[str, Any]:
         "known": dict(patient.known),
         "fitted": None if fit is None else dict(fit.values),
         "residual_mm": None if fit is None else round(fit.residual_mm, 4),
+        "lasting": None if fit is None else round(fit.lasting, 4),
     }
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from naisr_model.surface.tracking import Tracked, Tracker
 
 KEPT_TRACKERS = 4
-"""How many persons' previews stay fast; each takes about 20 MB."""
+"""How many persons' previews stay fast; each takes about 35 MB, the average's 20."""
 
 
 class Previews:
@@ -32,7 +32,10 @@ class Previews:
         self._last: SurfaceResult | None = None  # sub-plots may show the same surface
 
     def tracker(self, path: Path, person: int) -> Tracker | None:
-        """What carries the template for a person; None before :meth:`keep` and after :meth:`forget`."""
+        """What carries the template for a person.
+
+        None before :meth:`keep`, after :meth:`forget`, and when newer ones took the place.
+        """
         return self._trackers.get((path, person))
 
     def keep(self, path: Path, person: int, tracker: Tracker) -> None:

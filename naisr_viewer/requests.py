@@ -30,7 +30,7 @@ EXACT_RESOLUTION = 128
 FORMATS = ("stl", "ply", "obj", "vtp", "glb")
 """Mesh files that can be written."""
 
-SIGNED = {"scan": True, "certainty": False, "change": True}
+HAS_TWO_SIDES = {"scan": True, "certainty": False, "change": True}
 """Kinds of panels with numbers on their surface, and whether the scale of these has two sides."""
 
 Progress = Callable[[float], None]
@@ -147,7 +147,7 @@ def simplest(request: SurfaceRequest, covariates: tuple[Covariate, ...]) -> Surf
     g_i vanishes where covariate i is at its centre, so Phi with a single covariate off its centre is
     that covariate's Phi_i, and with none it is the template T, whoever it is.
     """
-    if request.panel.kind in SIGNED:
+    if request.panel.kind in HAS_TWO_SIDES:
         return request
     centre = {covariate.name: covariate.centre for covariate in covariates}
     moved = tuple((name, value) for name, value in request.values if value != centre[name])

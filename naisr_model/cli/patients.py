@@ -67,14 +67,15 @@ def transfer(
     to: Annotated[
         str,
         Parameter(
-            help="covariates to show the patient at, as age=120,weight=28.5; the others stay as they are."
+            help="covariates to show the patient at, as age=120,weight=28.5; "
+            "the others stay as known or as fitted."
         ),
     ],
     reading: Reading = _AS_IT_IS,
     out: Annotated[Path | None, Parameter(help="folder for both surfaces, a table and a picture.")] = None,
     json_file: JsonFile = None,
 ) -> None:
-    """Show a patient's shape at other covariates, with what lasts of what sets the patient apart."""
+    """Show a patient's shape at other covariates, as it is expected on another day."""
     from naisr_model.evaluation.evolution import parsed
 
     fitted, intake = _fitted(patient, atlas, reading)
@@ -157,5 +158,5 @@ def _tell_series(
         where = ", ".join(c.format(person.covariates[c.name]) for c in person.atlas.covariates)
         low, high = record["volume_low_cm3"], record["volume_high_cm3"]
         print(f"{where}: {record['volume_cm3']:.1f} cm³ ({low:.1f} to {high:.1f})")
-    print(f"kept away from the patient's covariates: {fitted.lasting:.0%} of what sets the patient apart")
+    print(f"at other covariates {fitted.lasting:.0%} of what sets the patient apart is kept")
     write_json(json_file, {"patient": intake.to_json(), "lasting": fitted.lasting, "shapes": records})

@@ -96,8 +96,8 @@ def transfer(
 
     A fit is shown at the other covariates themselves, whether its own were given or inferred, with what is
     expected to last of its code; beside it stands the paper's transfer, which keeps the whole code. (To
-    inferred covariates the paper adds the change of the true ones; where a shape hardly tells it, as that
-    of a grown-up does, this carries the error of the age along.) In the second question the covariates
+    inferred covariates the paper adds the change of the true ones; where a shape hardly tells the age, as a
+    grown-up's does, this carries the error of the age along.) In the second question the covariates
     are those of the next held-out subject with the same binary ones, so that they are plausible together;
     the truth is what the synthetic population makes of the fitted visit's own variation at them. Subjects
     whose first visit is outside the observed ranges are left out.
@@ -111,8 +111,8 @@ def transfer(
 
     Returns:
         For each of :data:`QUESTIONS` that can be asked a record with a :func:`~.tables.summary` and the
-        share ``held`` of volumes inside their interval for each of :data:`WAYS`, and ``cases`` with the
-        volumes in cm3; and what the columns mean.
+        share ``held`` of volumes inside their interval and its median ``width_cm3`` for each of
+        :data:`WAYS`, and ``cases`` with the volumes in cm3; and what the columns mean.
 
     Raises:
         InputError: when there is nobody to predict.
@@ -207,7 +207,12 @@ def _record(cases: Sequence[Case]) -> dict[str, Any]:
     for way in WAYS:
         found = [case.ways[way].distances for case in cases]
         held = [one.holds(_volume_cm3(case.truth)) for case in cases if (one := case.ways[way]).interval_cm3]
-        ways[way] = {**summary([one for one in found if one]), "held": float(np.mean(held)) if held else None}
+        ends = [one.interval_cm3 for case in cases if (one := case.ways[way]).interval_cm3]
+        ways[way] = {
+            **summary([one for one in found if one]),
+            "held": float(np.mean(held)) if held else None,
+            "width_cm3": float(np.median(np.diff(ends))) if ends else None,
+        }
     people = len({case.seen.subject for case in cases})
     return {"n": len(cases), "subjects": people, **ways, "cases": [_case_record(case) for case in cases]}
 
@@ -250,15 +255,18 @@ def transfer_markdown(report: Mapping[str, Any], published: Sequence[Published] 
 
 
 def _question_table(title: str, record: Mapping[str, Any], published: Sequence[Published]) -> str:
-    rows = [[label, *distance_cells(record[way]), _share(record[way]["held"])] for way, label in WAYS.items()]
-    rows += [[f"published: {row.label}", *published_cells(row), "–"] for row in published]
-    header = ["", *COLUMNS.values(), "volume inside its 95 % interval"]
+    rows = [[label, *distance_cells(record[way]), *_interval(record[way])] for way, label in WAYS.items()]
+    rows += [[f"published: {row.label}", *published_cells(row), "–", "–"] for row in published]
+    header = ["", *COLUMNS.values(), "volume inside its 95 % interval", "median width of that, cm³"]
     size = f"{record['n']} shapes of {record['subjects']} held-out subjects, mean / median"
     return f"**{title}: {size}**\n\n{markdown_table(header, rows)}"
 
 
-def _share(share: float | None) -> str:
-    return "–" if share is None else f"{share:.0%}"
+def _interval(record: Mapping[str, Any]) -> tuple[str, str]:
+    if record["held"] is None:
+        return "–", "–"
+    width = record["width_cm3"]
+    return f"{record['held']:.0%}", f"{width:,.0f}" if width > 100 else f"{width:.3g}"
 
 
 def _patient_table(cases: Sequence[Mapping[str, Any]]) -> str:

@@ -4,9 +4,9 @@ The parameters theta are the inferred covariates and the whitened code. A surfac
 its normal by -dr/dtheta . dtheta, so the Jacobian of the distances gives what the covariance of theta
 means for the surface and for the volume that it encloses.
 
-At other covariates another day is meant. Codes w of two visits of a person are taken for standard normal with
-the correlation rho that the training population's visits have, so that of one the other is known to be
-rho w, give or take 1 - rho^2.
+At other covariates another day is meant. Whitened codes w of two visits of a person are taken for standard
+normal, all their elements with one correlation rho, so that of one the other is known to be rho w with the
+variance 1 - rho^2. rho is that of the codes z of the training population's visits, all directions together.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ ONE_DAY = 0.1
 what lasts. Codes of training visits 0.1 to 0.2 apart are no more alike than those of visits farther apart."""
 
 SAME = 1e-6
-"""Covariates closer than this are the same."""
+"""Covariates closer than this are the same: real units and back cost the last digits."""
 
 TWO_SIDED_95 = 1.959964
 
@@ -103,7 +103,8 @@ def remaining(posterior: Posterior, covariates: Vector) -> float:
 
 def nearness(posterior: Posterior, covariates: Vector) -> float:
     """How nearly other covariates are those of the same day, 0 to 1; exactly 1 at those of the fit."""
-    return float(np.exp(-_away(posterior, covariates) / ONE_DAY))
+    away = float(np.linalg.norm(covariates - posterior.covariates))
+    return 1.0 if away < SAME else float(np.exp(-away / ONE_DAY))
 
 
 def moved(posterior: Posterior, covariates: Vector) -> Posterior:
@@ -113,19 +114,15 @@ def moved(posterior: Posterior, covariates: Vector) -> Posterior:
     what does not remain of it is as open as that of a stranger. At the covariates of the fit itself nothing
     changes.
     """
-    share = remaining(posterior, covariates)
-    if _away(posterior, covariates) < SAME:
+    near, share = nearness(posterior, covariates), remaining(posterior, covariates)
+    if near == 1:
         return posterior
     count = len(posterior.problem.free)
     here, there = (matrix[count:, count:] for matrix in (posterior.along, posterior.covariance))
-    known = here + (1 - nearness(posterior, covariates)) * (there - here)
+    known = here + (1 - near) * (there - here)
     code = share**2 * known + (1 - share**2) * np.eye(len(here))
     problem = dataclasses.replace(posterior.problem, fixed=covariates)
     return Posterior(covariates, problem, code, code, posterior.noise)
-
-
-def _away(posterior: Posterior, covariates: Vector) -> float:
-    return float(np.linalg.norm(covariates - posterior.covariates))
 
 
 def surface_deviations(

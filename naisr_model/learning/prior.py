@@ -72,7 +72,8 @@ def _lasting(codes: NDArray[np.float64], subjects: NDArray[np.str_]) -> float:
         return UNSEEN_LASTING
     means = np.stack([codes[own == number].mean(axis=0) for number in range(len(visits))])
     within = np.sum((codes - means[own]) ** 2) / np.sum(visits - 1)
-    return float(np.clip(1 - within / np.mean(np.sum(codes**2, axis=1)), 0, 1))
+    whole = np.mean(np.sum(codes**2, axis=1))
+    return float(np.clip(1 - within / whole, 0, 1)) if whole else 0.0
 
 
 def _root(latents: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -52,8 +52,8 @@ TEMPLATE_LATTICE = Lattice(128)
 """Where T is tabulated."""
 
 
-Displacement = Callable[[Tensor], Tensor]
-"""d of points ``[3, n]``, ``[3, n]``, model units."""
+PointMap = Callable[[Tensor], Tensor]
+"""From points ``[3, n]`` to what is there, ``[3, n]``; model units."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +137,7 @@ class CodeTracker:
         points_mm = self.frame.to_mm(_columns(points)).astype(np.float32)
         return Tracked(points_mm, _columns(normals), float((error > RESOLVED).float().mean()), folds)
 
-    def displacement(self, values: Values) -> Displacement:
+    def displacement(self, values: Values) -> PointMap:
         """The sum d by interpolation; the further out of range, the worse."""
         vector = normalised_vector(self.covariates, complete(self.covariates, values, extrapolate=True))
         field, lower = self.displacements.at(vector), self.displacements.lower
@@ -186,7 +186,10 @@ class FadingTracker:
 
     def guess(self, values: Values) -> Field:
         """As :meth:`Tracker.guess`."""
-        share, far, near = self._share(values), self.far.displacement(values), self.near.displacement(values)
+        share = self._share(values)
+        if share in (0.0, 1.0):
+            return (self.near if share else self.far).guess(values)
+        far, near = self.far.displacement(values), self.near.displacement(values)
         return _composed(
             self.far.template_values, lambda points: torch.lerp(far(points), near(points), share)
         )
@@ -244,7 +247,7 @@ def _solve(field: Tensor, lower: Tensor, targets: Tensor, points: Tensor) -> tup
         steps += 1
 
 
-def _composed(template_values: Tensor, displacement: Displacement) -> Field:
+def _composed(template_values: Tensor, displacement: PointMap) -> Field:
     """T(p + d(p)) with T by interpolation."""
 
     def field(points: NDArray[np.float32]) -> NDArray[np.float32]:

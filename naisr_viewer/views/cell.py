@@ -9,7 +9,7 @@ from PySide6.QtCore import QRect, Qt
 from PySide6.QtWidgets import QLabel, QWidget
 
 from naisr_viewer.captions import PANEL_HINTS
-from naisr_viewer.requests import SIGNED, SurfaceResult
+from naisr_viewer.requests import HAS_TWO_SIDES, SurfaceResult
 from naisr_viewer.state import AtlasCard, Panel, panel_title
 from naisr_viewer.views.colour_bar import HEIGHT_PX, WIDTH_PX, ColourBar
 from naisr_viewer.views.theme import panel_colour
@@ -21,7 +21,7 @@ CAPTION_PX = 52
 
 def strip_height(panels: Sequence[Panel]) -> int:
     """Pixels beneath every shape for colour bars; none where no panel has one."""
-    return HEIGHT_PX if any(panel.kind in SIGNED for panel in panels) else 0
+    return HEIGHT_PX if any(panel.kind in HAS_TWO_SIDES for panel in panels) else 0
 
 
 def drawn_height(area: QRect, strip: int) -> int:
@@ -77,7 +77,7 @@ def make_cell(panel: Panel, atlas: AtlasCard, parent: QWidget) -> Cell:
     volume = QLabel(parent)
     volume.setObjectName("volume")
     volume.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
-    bar = ColourBar(SIGNED[panel.kind], parent) if panel.kind in SIGNED else None
+    bar = ColourBar(HAS_TWO_SIDES[panel.kind], parent) if panel.kind in HAS_TWO_SIDES else None
     if bar is not None:
         bar.setToolTip(PANEL_HINTS[panel.kind])
     return Cell(title, volume, bar)

@@ -59,7 +59,7 @@ def findings(fit: Fitted, covariates: Sequence[Covariate]) -> list[tuple[str, st
         *rows,
         ("Volume", f"{volume(fit.volume_cm3, fit.volume_margin_cm3)} (95 %)", ""),
         ("Residual", f"{fit.residual_mm:.2f} mm", "mean distance, scan to fitted surface"),
-        ("Kept", f"{100 * fit.lasting:.0f} %", "of what sets the patient apart, elsewhere"),
+        ("Lasting", f"{100 * fit.lasting:.0f} %", "of what sets the patient apart"),
         ("Time", f"{fit.seconds:.1f} s", ""),
     ]
 

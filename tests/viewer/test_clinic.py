@@ -13,6 +13,7 @@ from eggs import egg
 from naisr_model.atlas import Atlas
 from naisr_model.data.samples import signed_distance
 from naisr_model.errors import Cancelled, InputError
+from naisr_model.learning import prior
 from naisr_viewer.clinic import SHOWN_POINTS, Clinic
 from naisr_viewer.engine import Engine
 from naisr_viewer.members import rounded
@@ -68,6 +69,33 @@ def test_the_fit_is_that_of_python(desk, egg_atlas, file):
     low, high = expected.volume_interval_cm3
     assert fit.volume_cm3 == pytest.approx(expected.volume_cm3, rel=1e-3)
     assert fit.volume_margin_cm3 == pytest.approx((high - low) / 2, rel=0.05)
+
+
+def test_elsewhere_only_what_lasts_of_a_patient_is_shown(egg_atlas, tmp_path, monkeypatch):
+    monkeypatch.setattr(prior, "UNSEEN_LASTING", 0.3)
+    atlas, file = Atlas.load(egg_atlas), tmp_path / "outstanding.stl"
+    atlas.shape(dict(KNOWN), 8 * atlas.checkpoint.latents[0], 64).export(file)
+    engine = Engine(folder=tmp_path / "cache")
+    clinic, state = Clinic(engine), opened(ExplorerState(), engine.open(egg_atlas))
+    reading = Reading(file)
+    scan = clinic.read(egg_atlas, reading, KNOWN)
+    fit = clinic.fit(egg_atlas, scan, KNOWN, lambda _: None)
+    state = with_patient(state, Patient(1, file.name, reading, scan, KNOWN, fit))
+    elsewhere = with_value(state, "age", 3.0)
+    assert fit.lasting == 0.3
+    person = atlas.fit(trimesh.load_mesh(file), dict(KNOWN)).at({"age": 3.0})
+    values = dict(elsewhere.named)
+    kept, whole = (atlas.shape(values, share * person.latent).volume / 1000 for share in (1, 1 / 0.3))
+    shown = engine.surface(request_for(elsewhere, FULL_SHAPE, 128))
+    assert shown.volume_cm3 == pytest.approx(kept, rel=2e-3) and abs(whole / kept - 1) > 5e-3
+    low, high = person.volume_interval_cm3
+    assert shown.volume_margin_cm3 == pytest.approx((high - low) / 2, rel=0.05)
+    distances = engine.surface(request_for(elsewhere, SCAN, 128)).colouring.values_mm
+    expected = atlas.sdf(scan.points_mm, values, person.latent)
+    assert (
+        np.abs(distances - expected).mean()
+        < 0.1 * np.abs(distances - atlas.sdf(scan.points_mm, values, person.latent / 0.3)).mean()
+    )
 
 
 def test_the_scan_carries_its_distance_to_the_shape(desk):
