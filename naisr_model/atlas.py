@@ -18,6 +18,7 @@ import numpy as np
 import torch
 import trimesh
 from numpy.typing import ArrayLike, NDArray
+from threadpoolctl import threadpool_limits
 from torch import Tensor
 
 from naisr_model.checkpoint import Checkpoint, load
@@ -290,10 +291,12 @@ class Atlas:
         binary = [i for i, covariate in enumerate(self.covariates) if covariate.kind == "binary"]
         target = target_of(shape, self.frame)
         network = self._cpu_network
-        fits = fit_shape(
-            network, target, self._prior, vector, binary, progress=progress, should_stop=should_stop
-        )
-        posterior = posterior_of(network, target, self._prior, fits[0])
+        # Threads of NumPy's linear algebra spin when it is torch's turn: on two cores twice the time.
+        with threadpool_limits(1, user_api="blas"):
+            fits = fit_shape(
+                network, target, self._prior, vector, binary, progress=progress, should_stop=should_stop
+            )
+            posterior = posterior_of(network, target, self._prior, fits[0])
         check = draw_sample(target, POINTS, CHECK_SAMPLE).points[:POINTS].numpy()
         found, code = network.tensor(fits[0].covariates), network.tensor(fits[0].latent)
         residuals = np.abs(distances(network, check, found, code))
