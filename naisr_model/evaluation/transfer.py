@@ -4,7 +4,7 @@ Two questions are asked. *Other visits*: the first visit of a held-out subject i
 predicted at its covariates, as in the paper; what changes from day to day, such as the position of the head,
 is in the truth and cannot be predicted. *Same person, other covariates*: of a synthetic population the
 generator knows what the fitted person looks like, on the same day, with somebody else's age and weight, also
-where everybody was seen once; there nothing but the fit and the atlas can be wrong.
+where everybody was seen once; there what a fit leaves out as not lasting counts against it.
 """
 
 from __future__ import annotations
@@ -69,10 +69,6 @@ class Prediction:
     distances: Distances | None
     volume_cm3: float
     interval_cm3: tuple[float, float] | None
-
-    def holds(self, volume_cm3: float) -> bool:
-        """Whether the interval holds a volume."""
-        return self.interval_cm3 is not None and self.interval_cm3[0] <= volume_cm3 <= self.interval_cm3[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,12 +202,12 @@ def _record(cases: Sequence[Case]) -> dict[str, Any]:
     ways = {}
     for way in WAYS:
         found = [case.ways[way].distances for case in cases]
-        held = [one.holds(_volume_cm3(case.truth)) for case in cases if (one := case.ways[way]).interval_cm3]
-        ends = [one.interval_cm3 for case in cases if (one := case.ways[way]).interval_cm3]
+        sure = [(_volume_cm3(case.truth), ends) for case in cases if (ends := case.ways[way].interval_cm3)]
+        held = [low <= volume <= high for volume, (low, high) in sure]
         ways[way] = {
             **summary([one for one in found if one]),
             "held": float(np.mean(held)) if held else None,
-            "width_cm3": float(np.median(np.diff(ends))) if ends else None,
+            "width_cm3": float(np.median([high - low for _, (low, high) in sure])) if sure else None,
         }
     people = len({case.seen.subject for case in cases})
     return {"n": len(cases), "subjects": people, **ways, "cases": [_case_record(case) for case in cases]}

@@ -136,6 +136,14 @@ class Told(NamedTuple):
     log_height: float
 
 
+class Kernel(NamedTuple):
+    """A weighted Gaussian over the free covariates."""
+
+    mean: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    log_weight: float
+
+
 def believed(prior: Prior, fixed: NDArray[np.float64], told: Sequence[Told]) -> Belief:
     """What is known of the free covariates when the Gaussian prior gives way to the population itself.
 
@@ -154,18 +162,16 @@ def believed(prior: Prior, fixed: NDArray[np.float64], told: Sequence[Told]) -> 
     kernels = [_kernel_given(prior, fixed, row) for row in prior.training]
     places = np.array([one.place for one in told])
     parts = []
-    for centre, kernel, log_weight in kernels:
-        offsets = places - centre
+    for kernel in kernels:
+        offsets = places - kernel.mean
         distances = np.einsum("pi,ij,pj->p", offsets, told[0].precision, offsets)
-        parts.append(
-            _weighted(told[int(distances.argmin())], prior_mean, prior_precision, centre, kernel, log_weight)
-        )
-    means, covariances = (np.array([part[i] for part in parts]) for i in range(2))
-    logs = np.array([part[2] for part in parts])
+        parts.append(_weighted(told[int(distances.argmin())], prior_mean, prior_precision, kernel))
+    means, covariances, logs = (np.array(column) for column in zip(*parts, strict=True))
     log_sum = float(np.logaddexp.reduce(logs))
     weights = np.exp(logs - log_sum)
     prior_covariance = np.asarray(np.linalg.inv(prior_precision), dtype=np.float64)
-    gaussian = _weighted(told[0], prior_mean, prior_precision, prior_mean, prior_covariance, 0.0)[2]
+    own = Kernel(prior_mean, prior_covariance, 0.0)
+    gaussian = _weighted(told[0], prior_mean, prior_precision, own).log_weight
     densities = _marginals(prior, free, weights, means, covariances)
     middle = np.array([d @ places_of(prior, int(i)) for d, i in zip(densities, free, strict=True)])
     offsets = means - weights @ means
@@ -177,31 +183,24 @@ def _weighted(
     told: Told,
     prior_mean: NDArray[np.float64],
     prior_precision: NDArray[np.float64],
-    centre: NDArray[np.float64],
-    kernel: NDArray[np.float64],
-    log_weight: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """Mean, covariance and log integral of what is told, without the Gaussian prior, times a kernel."""
+    kernel: Kernel,
+) -> Kernel:
+    """What is told, without the Gaussian prior, times a kernel; its log weight is the log integral."""
     precision = told.precision - prior_precision
     pull = told.precision @ told.mean - prior_precision @ prior_mean
     at_zero = prior_mean @ prior_precision @ prior_mean - told.mean @ told.precision @ told.mean
-    return _product(precision, pull, centre, kernel, log_weight + told.log_height + 0.5 * float(at_zero))
+    raised = kernel._replace(log_weight=kernel.log_weight + told.log_height + 0.5 * float(at_zero))
+    return _product(precision, pull, raised)
 
 
-def _product(
-    told: NDArray[np.float64],
-    pull: NDArray[np.float64],
-    centre: NDArray[np.float64],
-    kernel: NDArray[np.float64],
-    log_weight: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """Mean, covariance and log integral of exp(-x told x / 2 + pull x) times a weighted Gaussian kernel."""
-    inverse = np.linalg.inv(kernel)
-    covariance = np.linalg.inv(told + inverse)
-    peak = covariance @ (pull + inverse @ centre)
-    exponent = peak @ (told + inverse) @ peak - centre @ inverse @ centre
-    determinants = np.linalg.slogdet(covariance)[1] - np.linalg.slogdet(kernel)[1]
-    return peak, covariance, log_weight + 0.5 * float(exponent + determinants)
+def _product(precision: NDArray[np.float64], pull: NDArray[np.float64], kernel: Kernel) -> Kernel:
+    """exp(-x precision x / 2 + pull x) times a kernel; its log weight is the log integral."""
+    inverse = np.linalg.inv(kernel.covariance)
+    covariance = np.linalg.inv(precision + inverse)
+    peak = covariance @ (pull + inverse @ kernel.mean)
+    exponent = peak @ (precision + inverse) @ peak - kernel.mean @ inverse @ kernel.mean
+    determinants = np.linalg.slogdet(covariance)[1] - np.linalg.slogdet(kernel.covariance)[1]
+    return Kernel(peak, covariance, kernel.log_weight + 0.5 * float(exponent + determinants))
 
 
 def _marginals(
@@ -220,10 +219,8 @@ def _marginals(
     return result / result.sum(axis=1, keepdims=True)
 
 
-def _kernel_given(
-    prior: Prior, fixed: NDArray[np.float64], row: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """Mean and covariance of one row's kernel given the known covariates, and its log weight."""
+def _kernel_given(prior: Prior, fixed: NDArray[np.float64], row: NDArray[np.float64]) -> Kernel:
+    """One row's kernel given the known covariates."""
     free, known = np.isnan(fixed), ~np.isnan(fixed)
     distance = np.linalg.norm(prior.training - row, axis=1)
     offsets = prior.training[np.argsort(distance)[:NEIGHBOURS]] - row
@@ -232,4 +229,4 @@ def _kernel_given(
     gap, gain = (fixed - row)[known], kernel[np.ix_(free, known)] @ inverse
     log_weight = -0.5 * gap @ inverse @ gap - 0.5 * np.linalg.slogdet(kernel[np.ix_(known, known)])[1]
     covariance = kernel[np.ix_(free, free)] - gain @ kernel[np.ix_(known, free)]
-    return row[free] + gain @ gap, covariance, float(log_weight)
+    return Kernel(row[free] + gain @ gap, covariance, float(log_weight))
