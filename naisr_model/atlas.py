@@ -25,8 +25,7 @@ from naisr_model.checkpoint import Checkpoint, load
 from naisr_model.covariates import Covariate, Population, Values, complete, normalised_vector
 from naisr_model.errors import InputError
 from naisr_model.frames import Frame
-from naisr_model.learning.fit import ShapeFit, draw_sample, fit_shape
-from naisr_model.learning.posterior import (
+from naisr_model.learning.fitting.posterior import (
     POINTS,
     TWO_SIDED_95,
     Posterior,
@@ -37,10 +36,11 @@ from naisr_model.learning.posterior import (
     surface_deviations,
     volume_deviation,
 )
-from naisr_model.learning.prior import Prior, places_of, prior_of
-from naisr_model.learning.target import target_of
-from naisr_model.networks.devices import usable_device
-from naisr_model.networks.naisr import Naisr
+from naisr_model.learning.fitting.prior import Prior, places_of, prior_of
+from naisr_model.learning.fitting.search import ShapeFit, draw_sample, fit_shape
+from naisr_model.learning.fitting.target import target_of
+from naisr_model.models.devices import usable_device
+from naisr_model.models.naisr.network import Naisr
 from naisr_model.surface.displacements import Displacements, DisplacementTables, tabulate
 from naisr_model.surface.fields import distances, effect_field, shape_field, template_field
 from naisr_model.surface.isosurface import isosurface
@@ -395,8 +395,8 @@ class Individual:
     def elsewhere(self, vector: NDArray[np.float64]) -> Individual:
         """A fitted person at other centred covariates ``[N]``, with what is expected to last of the code.
 
-        How much that is says :func:`~naisr_model.learning.posterior.remaining`. It counts from the fit, so a
-        person who has been moved is not to be moved again.
+        How much that is says :func:`~naisr_model.learning.fitting.posterior.remaining`. It counts from the
+        fit, so a person who has been moved is not to be moved again.
         """
         share = remaining(self.posterior, vector)
         return Individual(self.atlas, vector, share * self.latent, moved(self.posterior, vector))

@@ -24,7 +24,7 @@ from naisr_model.data.align import Alignment
 from naisr_model.errors import InputError
 from naisr_model.files import replacing
 from naisr_model.frames import Frame
-from naisr_model.networks.naisr import Naisr
+from naisr_model.models.naisr.network import Naisr
 
 FORMAT = "naisr-atlas"
 VERSION = 1
@@ -39,7 +39,7 @@ class Checkpoint:
     Attributes:
         name: of the population, for example ``airway``.
         preset: network sizes and training settings.
-        weights: state dictionary of :class:`~naisr_model.networks.naisr.Naisr`.
+        weights: state dictionary of :class:`~naisr_model.models.naisr.network.Naisr`.
         latents: codes of the training rows in population order, float32 ``[n_train, L]``.
         population: all rows, held-out ones included, with the covariates.
         frame: millimetres to model units.

@@ -18,13 +18,14 @@ from cyclopts import Parameter
 
 from naisr_model.errors import InputError
 from naisr_model.shipped import shipped_atlas
-from naisr_viewer.engine import VERSION, Engine, load_atlas
+from naisr_viewer import __version__
+from naisr_viewer.engine.engine import Engine, load_atlas
 
 if TYPE_CHECKING:
     from PySide6.QtWidgets import QApplication
 
-    from naisr_viewer.controller import Controller
-    from naisr_viewer.state import AtlasCard
+    from naisr_viewer.control.controller import Controller
+    from naisr_viewer.state.explorer import AtlasCard
     from naisr_viewer.views.main_window import MainWindow
 
 LOADED = time.monotonic()
@@ -33,7 +34,7 @@ LOADED = time.monotonic()
 cli = cyclopts.App(
     name="naisr-viewer",
     help="Explore how anatomy changes with age, weight, sex and other covariates.",
-    version=VERSION,
+    version=__version__,
     help_on_error=False,
 )
 
@@ -155,11 +156,11 @@ def make_window(engine: Engine, settings_file: Path | None = None) -> tuple[Main
     """
     from PySide6.QtCore import QSettings
 
-    from naisr_viewer.clinic import Clinic
-    from naisr_viewer.controller import Controller
-    from naisr_viewer.desk import PatientDesk
+    from naisr_viewer.control.controller import Controller
+    from naisr_viewer.control.desk import PatientDesk
+    from naisr_viewer.control.worker import Worker
+    from naisr_viewer.engine.clinic import Clinic
     from naisr_viewer.views.main_window import MainWindow
-    from naisr_viewer.worker import Worker
 
     if settings_file is None:
         settings = QSettings("naisr", "naisr-viewer")
@@ -193,7 +194,7 @@ def _attended(
     """The window in the hands of a person, until it is closed."""
     from PySide6.QtCore import Qt
 
-    from naisr_viewer.display import has_display
+    from naisr_viewer.program.display import has_display
 
     if not has_display():
         raise InputError("there is no display; use --screenshot, --demo or --measure, which need none")
@@ -233,7 +234,7 @@ def _show(
 
 def _measured(engine: Engine, path: Path, pixels: tuple[int, int], file: Path) -> int:
     """The window as a person starts and drags it, with a stop-watch; leaves the user's settings alone."""
-    from naisr_viewer.display import ensure_display
+    from naisr_viewer.program.display import ensure_display
 
     before = time.monotonic()
     ensure_display(pixels)
@@ -241,7 +242,7 @@ def _measured(engine: Engine, path: Path, pixels: tuple[int, int], file: Path) -
     make_application()
     with TemporaryDirectory(prefix="naisr-viewer-") as folder:
         window, controller = make_window(engine, Path(folder) / "settings.ini")
-        from naisr_viewer.measure import Observer, measure, process_start
+        from naisr_viewer.program.measure import Observer, measure, process_start
 
         observer = Observer(window, controller)
         _show(window, controller, path, None, {}, pixels)
@@ -263,8 +264,8 @@ def _unattended(
     demo: Path | None,
 ) -> int:
     """The same window without a person; leaves no trace in the user's settings."""
-    from naisr_viewer import headless
-    from naisr_viewer.display import ensure_display
+    from naisr_viewer.program import headless
+    from naisr_viewer.program.display import ensure_display
 
     ensure_display(pixels)
     make_application()

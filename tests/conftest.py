@@ -11,7 +11,7 @@ from eggs import egg, egg_preset
 
 from naisr_model.data.prepare import PrepareOptions, prepare
 from naisr_model.data.store import SampleStore
-from naisr_model.learning.train import train
+from naisr_model.learning.training.loop import train
 
 
 @pytest.fixture(autouse=True, scope="session")

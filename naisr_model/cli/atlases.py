@@ -44,7 +44,7 @@ def train(
     from naisr_model.config import preset as named
     from naisr_model.config import read_toml
     from naisr_model.data.store import SampleStore
-    from naisr_model.learning.train import train as run
+    from naisr_model.learning.training.loop import train as run
 
     budget = math.inf if time_budget is None else seconds(time_budget)
     chosen = named(preset) if config is None else read_toml(config, named(preset))

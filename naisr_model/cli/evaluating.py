@@ -30,9 +30,9 @@ def reconstruction(
     atlas: AtlasFile, *, store: StoreFolder = None, json_file: JsonFile = None, limit: Limit = 0
 ) -> None:
     """Refit the held-out shapes, covariates given and inferred; check effects where the truth is known."""
-    from naisr_model.evaluation.reconstruction import EvaluationConfig
-    from naisr_model.evaluation.reconstruction import evaluate as run
-    from naisr_model.evaluation.tables import PUBLISHED_AIRWAY, reconstruction_markdown
+    from naisr_model.evaluation.reports import PUBLISHED_AIRWAY, reconstruction_markdown
+    from naisr_model.evaluation.studies.reconstruction import EvaluationConfig
+    from naisr_model.evaluation.studies.reconstruction import evaluate as run
 
     loaded, samples = _with_held_out(atlas, store, limit)
     published = PUBLISHED_AIRWAY if loaded.name == "airway" else ()
@@ -55,9 +55,9 @@ def transfer(
     ] = 0,
 ) -> None:
     """Fit held-out subjects once and predict them at other visits and other covariates."""
-    from naisr_model.evaluation.tables import PUBLISHED_AIRWAY_TRANSFER
-    from naisr_model.evaluation.transfer import transfer as run
-    from naisr_model.evaluation.transfer import transfer_markdown
+    from naisr_model.evaluation.reports import PUBLISHED_AIRWAY_TRANSFER
+    from naisr_model.evaluation.studies.transfer import transfer as run
+    from naisr_model.evaluation.studies.transfer import transfer_markdown
 
     loaded, samples = _with_held_out(atlas, store, limit)
     published = PUBLISHED_AIRWAY_TRANSFER if loaded.name == "airway" else ()
@@ -74,9 +74,9 @@ def completion(
     atlas: AtlasFile, *, store: StoreFolder = None, json_file: JsonFile = None, limit: Limit = 0
 ) -> None:
     """Cut a third of each held-out surface away and measure how well a fit of the rest completes it."""
-    from naisr_model.evaluation.completion import completion as run
-    from naisr_model.evaluation.completion import completion_markdown
-    from naisr_model.evaluation.reconstruction import held_out_shapes
+    from naisr_model.evaluation.studies.completion import completion as run
+    from naisr_model.evaluation.studies.completion import completion_markdown
+    from naisr_model.evaluation.studies.reconstruction import held_out_shapes
 
     loaded, samples = _with_held_out(atlas, store, limit)
     shapes = held_out_shapes(loaded, samples, limit or None)
@@ -93,8 +93,8 @@ def fitting(
 ) -> None:
     """Compare the fit with the paper's procedure on held-out shapes; the latter takes a minute a shape."""
     from naisr_model.config import FitConfig
-    from naisr_model.evaluation.fitting import compare_fits, comparison_markdown
-    from naisr_model.evaluation.reconstruction import held_out_shapes
+    from naisr_model.evaluation.studies.fit_speed import compare_fits, comparison_markdown
+    from naisr_model.evaluation.studies.reconstruction import held_out_shapes
 
     loaded, samples = _with_held_out(atlas, store, limit, least=1)
     shapes = held_out_shapes(loaded, samples, limit)
@@ -119,8 +119,8 @@ def calibration(
 ) -> None:
     """Count how often the 95 % intervals of a fit hold the truth, over new synthetic patients."""
     from naisr_model.atlas import Atlas
-    from naisr_model.evaluation.calibration import calibration as run
-    from naisr_model.evaluation.calibration import calibration_markdown
+    from naisr_model.evaluation.studies.calibration import calibration as run
+    from naisr_model.evaluation.studies.calibration import calibration_markdown
 
     require_at_least("--patients", patients, 1)
     names = [name.strip() for name in known.split(",") if name.strip()]
@@ -145,8 +145,8 @@ def bench(
     ] = "cpu",
 ) -> None:
     """Measure how fast everything is on this machine, at the paper's network size; takes some minutes."""
-    from naisr_model.evaluation.bench import QUICK, Scope, markdown
-    from naisr_model.evaluation.bench import bench as run
+    from naisr_model.benchmark.bench import QUICK, Scope, markdown
+    from naisr_model.benchmark.bench import bench as run
 
     scope = QUICK if quick else Scope()
     _measure(

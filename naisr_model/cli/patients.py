@@ -50,7 +50,7 @@ def fit(
     json_file: JsonFile = None,
 ) -> None:
     """Fit a patient's shape: covariates that are not given are inferred, all with 95 % intervals."""
-    from naisr_model.evaluation.evolution import fit_record, write_series
+    from naisr_model.patients.evolution import fit_record, write_series
 
     fitted, intake = _fitted(patient, atlas, reading)
     record = fit_record(fitted)
@@ -76,7 +76,7 @@ def transfer(
     json_file: JsonFile = None,
 ) -> None:
     """Show a patient's shape at other covariates, as it is expected on another day."""
-    from naisr_model.evaluation.evolution import parsed
+    from naisr_model.patients.evolution import parsed
 
     fitted, intake = _fitted(patient, atlas, reading)
     moved = fitted.at(parsed(fitted.individual.atlas, pairs("--to", to)))
@@ -107,7 +107,7 @@ def evolve(
     json_file: JsonFile = None,
 ) -> None:
     """Follow a patient's shape along one covariate."""
-    from naisr_model.evaluation.evolution import evolution
+    from naisr_model.patients.evolution import evolution
 
     fitted, intake = _fitted(patient, atlas, reading)
     _tell_series(fitted, intake, evolution(fitted, along, start, stop, steps, path), out, json_file)
@@ -116,8 +116,8 @@ def evolve(
 def _fitted(patient: Path, atlas: Path, reading: Reading) -> tuple[Any, Any]:
     """The fit, and how the file was brought into the frame of the atlas."""
     from naisr_model.atlas import Atlas
-    from naisr_model.evaluation.evolution import parsed
-    from naisr_model.evaluation.intake import take_in
+    from naisr_model.patients.evolution import parsed
+    from naisr_model.patients.intake import take_in
 
     loaded = Atlas.load(atlas)
     options = dataclasses.asdict(reading)
@@ -150,7 +150,7 @@ def _tell_fit(fitted: Any, alternatives: Sequence[Mapping[str, Any]]) -> None:
 def _tell_series(
     fitted: Any, intake: Any, people: Sequence[Any], out: Path | None, json_file: Path | None
 ) -> None:
-    from naisr_model.evaluation.evolution import write_series
+    from naisr_model.patients.evolution import write_series
 
     with bar("measuring") as progress, stoppable() as stop:
         records = write_series(out, people, progress=progress, should_stop=stop)

@@ -22,8 +22,8 @@ from torch.nn import functional
 
 from naisr_model.errors import Cancelled, InputError
 from naisr_model.files import replacing
-from naisr_model.networks.inference import PointFunction, effect_function
-from naisr_model.networks.naisr import Naisr
+from naisr_model.models.naisr.inference import PointFunction, effect_function
+from naisr_model.models.naisr.network import Naisr
 
 SPACINGS = (1 / 8, 1 / 16, 1 / 32)
 """Distances between tabulated nodes that are tried, in model units. The last is also the spacing of the

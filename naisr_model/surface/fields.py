@@ -7,8 +7,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from naisr_model.networks.inference import PointFunction, shape_function
-from naisr_model.networks.naisr import Naisr
+from naisr_model.models.naisr.inference import PointFunction, shape_function
+from naisr_model.models.naisr.network import Naisr
 from naisr_model.surface.sparse import Field
 
 LEAST_SLOPE = 0.3

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from naisr_model.frames import Frame
-from naisr_model.networks.calculus import deformation_determinant
-from naisr_model.networks.naisr import Naisr
+from naisr_model.models.naisr.calculus import deformation_determinant
+from naisr_model.models.naisr.network import Naisr
 from naisr_model.surface.fields import shape_field
 from naisr_model.surface.isosurface import isosurface
 from naisr_model.surface.lattice import Lattice

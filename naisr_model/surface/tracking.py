@@ -25,14 +25,8 @@ from torch import Tensor
 
 from naisr_model.covariates import Covariate, Values, complete, normalised_vector
 from naisr_model.frames import Frame
-from naisr_model.networks.naisr import Naisr
-from naisr_model.surface.displacements import (
-    SPACINGS,
-    Displacements,
-    DisplacementTables,
-    jacobian,
-    sample,
-)
+from naisr_model.models.naisr.network import Naisr
+from naisr_model.surface.displacements import SPACINGS, Displacements, DisplacementTables, jacobian, sample
 from naisr_model.surface.fields import template_field
 from naisr_model.surface.lattice import Lattice
 from naisr_model.surface.sparse import Field, continued, evaluate_band

@@ -20,9 +20,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from naisr_viewer.patients import Labels
-from naisr_viewer.requests import EXACT_RESOLUTION, FORMATS, ExportChoice
-from naisr_viewer.state import AtlasCard, ExplorerState, Panel, all_panels, panel_title
+from naisr_viewer.state.explorer import AtlasCard, ExplorerState, Panel, all_panels, panel_title
+from naisr_viewer.state.patients import Labels
+from naisr_viewer.state.requests import EXACT_RESOLUTION, FORMATS, ExportChoice
 
 ATLAS_FILTER = "Atlas (*.safetensors);;All files (*)"
 SCAN_ENDINGS = ("stl", "ply", "obj", "vtk", "vtp", "glb", "nii", "nii.gz", "nrrd", "csv", "txt", "xyz")

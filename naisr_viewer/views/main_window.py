@@ -34,9 +34,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from naisr_viewer.patients import Labels
-from naisr_viewer.state import OF_A_PATIENT, ExplorerState, Layout, visible_panels
-from naisr_viewer.views.covariate_panel import CovariatePanel
+from naisr_viewer.state.explorer import OF_A_PATIENT, ExplorerState, Layout, visible_panels
+from naisr_viewer.state.patients import Labels
+from naisr_viewer.views.covariates.panel import CovariatePanel
 from naisr_viewer.views.dialogs import (
     ExportDialog,
     about,
@@ -46,9 +46,9 @@ from naisr_viewer.views.dialogs import (
     ask_scan_path,
 )
 from naisr_viewer.views.empty_page import EmptyPage
-from naisr_viewer.views.patient_panel import PatientPanel
-from naisr_viewer.views.scale_bar import ScaleBar
-from naisr_viewer.views.shape_view import DIRECTIONS, ShapeView
+from naisr_viewer.views.patients.panel import PatientPanel
+from naisr_viewer.views.shapes.scale_bar import ScaleBar
+from naisr_viewer.views.shapes.shape_view import DIRECTIONS, ShapeView
 from naisr_viewer.views.theme import ThemeChoice, palette, resolved, style_sheet
 
 TITLE = "NAISR Atlas Explorer"

@@ -8,7 +8,7 @@ from enum import StrEnum
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QGuiApplication, QPalette
 
-from naisr_viewer.state import AtlasCard, Panel
+from naisr_viewer.state.explorer import AtlasCard, Panel
 
 
 class ThemeChoice(StrEnum):

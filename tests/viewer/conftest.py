@@ -18,11 +18,11 @@ from naisr_model.errors import Cancelled, InputError
 from naisr_model.frames import Frame
 from naisr_model.surface.displacements import DisplacementTables
 from naisr_model.surface.tracking import Tracked
-from naisr_viewer.controller import Controller
-from naisr_viewer.engine import Engine
-from naisr_viewer.state import AtlasCard
+from naisr_viewer.control.controller import Controller
+from naisr_viewer.control.worker import Worker
+from naisr_viewer.engine.engine import Engine
+from naisr_viewer.state.explorer import AtlasCard
 from naisr_viewer.views.main_window import MainWindow
-from naisr_viewer.worker import Worker
 
 AGE = Covariate("age", "months", "continuous", 100.0, 60.0, (1.0, 220.0))
 WEIGHT = Covariate("weight", "kg", "continuous", 35.0, 20.0, (4.0, 95.0))

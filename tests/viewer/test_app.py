@@ -17,7 +17,7 @@ from PySide6.QtGui import QImage
 from naisr_model import __version__
 from naisr_model.errors import InputError
 from naisr_viewer import app
-from naisr_viewer.engine import Engine
+from naisr_viewer.engine.engine import Engine
 
 ROOT = Path(__file__).parents[2]
 DISPLAY = ("DISPLAY", "WAYLAND_DISPLAY")
@@ -153,9 +153,11 @@ def test_the_second_start_paints_the_first_picture_before_the_networks_are_impor
         f"""
         import sys
         from pathlib import Path
-        from naisr_viewer import app, engine, headless
-        from naisr_viewer.display import ensure_display
-        from naisr_viewer.state import visible_panels
+        from naisr_viewer import app
+        from naisr_viewer.engine import engine
+        from naisr_viewer.program import headless
+        from naisr_viewer.program.display import ensure_display
+        from naisr_viewer.state.explorer import visible_panels
 
         def note(_count):
             shown = [controller.shown.get(panel) for panel in visible_panels(controller.state)]

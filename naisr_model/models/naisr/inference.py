@@ -1,0 +1,121 @@
+"""One shape at inference: what does not change from point to point is computed once.
+
+The covariates' and the code's share of a layer becomes its bias, and f_i(p, c_i, z) and f_i(p, 0, z)
+share their products with the point. The network of a covariate that is exactly 0 displaces nothing and
+is left out: Phi_i is Phi with every other covariate at 0, and T is Phi with all of them at 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import torch
+from torch import Tensor
+
+from naisr_model.models.naisr.network import Naisr
+from naisr_model.models.products import multiply
+from naisr_model.models.siren import SirenStack
+
+PointFunction = Callable[[Tensor], Tensor]
+"""Of points ``[n, dim]`` in model units, on the device and in the precision of the network."""
+
+
+def shape_function(network: Naisr, covariates: Tensor, latent: Tensor) -> PointFunction:
+    """Phi(p, c, z) = T(p + sum_i g_i(p, c_i, z)) of one shape, ``[n]``.
+
+    Args:
+        network: T and f_1 ... f_N.
+        covariates: c, centred, ``[N]``.
+        latent: z, ``[L]``.
+    """
+    displacement = displacement_function(network, covariates, latent)
+
+    @torch.inference_mode()
+    def shape(points: Tensor) -> Tensor:
+        return network.template((points + displacement(points))[None])[0]
+
+    return shape
+
+
+@torch.inference_mode()
+def displacement_function(network: Naisr, covariates: Tensor, latent: Tensor) -> PointFunction:
+    """sum_i g_i(p, c_i, z) = sum_i f_i(p, c_i, z) - f_i(p, 0, z) of one shape, ``[n, dim]``.
+
+    Args:
+        network: T and f_1 ... f_N.
+        covariates: c, centred, ``[N]``.
+        latent: z, ``[L]``.
+    """
+    active = covariates.nonzero()[:, 0].to(network.device)
+    if not len(active):
+        return torch.zeros_like
+    values = covariates.to(network.device)[active]
+    levels = torch.stack([values, torch.zeros_like(values)], dim=1)
+    states, last = _last_states(network.displacement_networks, active, levels, latent)
+
+    @torch.inference_mode()
+    def displacement(points: Tensor) -> Tensor:
+        at_value, at_zero = states(points).unbind(dim=1)
+        return torch.bmm(at_value - at_zero, last).sum(dim=0)
+
+    return displacement
+
+
+@torch.inference_mode()
+def effect_function(network: Naisr, index: int, values: Tensor, latent: Tensor) -> PointFunction:
+    """g_i(p, c_i, z) of one covariate at several of its values, ``[K, n, dim]``.
+
+    Args:
+        network: T and f_1 ... f_N.
+        index: i.
+        values: of c_i, centred, ``[K]``.
+        latent: z, ``[L]``.
+    """
+    levels = torch.cat([values, values.new_zeros(1)])[None].to(network.device)
+    one = torch.tensor([index], device=network.device)
+    states, last = _last_states(network.displacement_networks, one, levels, latent)
+
+    @torch.inference_mode()
+    def effect(points: Tensor) -> Tensor:
+        state = states(points)[0]
+        return (state[:-1] - state[-1:]) @ last[0]
+
+    return effect
+
+
+def _last_states(
+    stack: SirenStack, active: Tensor, levels: Tensor, latent: Tensor
+) -> tuple[PointFunction, Tensor]:
+    """The last hidden layer of some networks at several values of their covariate.
+
+    Args:
+        stack: f_1 ... f_N.
+        active: which of them, ``[A]``.
+        levels: values of c_i, ``[A, M]``.
+        latent: z, ``[L]``.
+
+    Returns:
+        A function of points that gives ``[A, M, n, width]``, and the weights ``[A, width, dim]`` of the
+        last layer, whose bias cancels in every g_i.
+    """
+    omega0 = stack.omega0  # the sines' frequency goes into the weights
+    heights = levels.to(stack.last_bias)[..., None]
+    codes = latent.to(stack.last_bias).expand(*levels.shape, -1)
+    first = omega0 * stack.point_weight[active].mT
+    conditions = torch.cat([heights, codes], dim=-1) @ stack.condition_weight[active].mT
+    first_bias = omega0 * (stack.first_bias[active, None] + conditions)[:, :, None]
+    skip = omega0 * stack.skip_point_weight[active].mT
+    skip_bias = omega0 * (heights @ stack.skip_condition_weight[active].mT)[:, :, None]
+    hidden = omega0 * stack.hidden_weight[:, active].mT
+    hidden_bias = omega0 * stack.hidden_bias[:, active]
+
+    def states(points: Tensor) -> Tensor:
+        state = ((points @ first)[:, None] + first_bias).sin_()
+        for layer, (weight, bias) in enumerate(zip(hidden, hidden_bias, strict=True)):
+            linear = multiply(state.flatten(1, 2), weight, bias).view(state.shape)
+            if layer == stack.middle:
+                linear += (points @ skip)[:, None] + skip_bias
+            state = linear.sin_()
+        return state
+
+    return states, stack.last_weight[active].mT

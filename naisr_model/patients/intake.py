@@ -1,0 +1,245 @@
+"""A patient's file brought into the frame of an atlas: read, repaired, aligned and checked.
+
+:func:`take_in` does all of it; a window goes step by step:
+
+>>> choices = labels(path)  # None, or what to choose from  # doctest: +SKIP
+>>> intake = read(path, atlas, label=2)  # shows intake.sentences and intake.findings  # doctest: +SKIP
+>>> moved = aligned(intake, atlas, {"age": 84}, "icp")  # shows moved.proposal  # doctest: +SKIP
+>>> fit = atlas.fit(moved.patient.mesh_mm, {"age": 84})  # if moved.is_ready  # doctest: +SKIP
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from naisr_model.atlas import Atlas
+from naisr_model.covariates import Values
+from naisr_model.data import volumes
+from naisr_model.data.align import Landmarks, Method, Proposal, propose, read_landmarks
+from naisr_model.data.patients import Finding, Patient, check_patient, moved, read_patient, repaired, scaled
+from naisr_model.errors import InputError
+
+StopCheck = Callable[[], bool]
+
+
+@dataclass(frozen=True, eq=False)
+class Intake:
+    """A patient's shape on its way to a fit, and what was done so far.
+
+    Attributes:
+        patient: as it lies now, in the frame of the atlas once nothing in ``findings`` is an error.
+            An open surface or a cloud of points (``not patient.is_closed``) is fitted as a part: it has
+            no volume of its own, says nothing of inside and outside, and is aligned by its own points
+            alone, so that an alignment of it deserves a closer look.
+        repairs: what was wrong with the file and was set right, a sentence each.
+        findings: what is still the matter, errors first; the only error among them is to lie far from
+            the atlas, which an alignment mends.
+        method: of the alignment: none, icp or landmarks.
+        proposal: the motion that was made; None without alignment.
+    """
+
+    patient: Patient
+    repairs: tuple[str, ...]
+    findings: tuple[Finding, ...]
+    method: Method = "none"
+    proposal: Proposal | None = None
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What is odd and was left, a sentence each."""
+        found = (f"{finding.sentence}; {finding.remedy}" for finding in self.findings)
+        doubt = () if self.proposal is None else _doubt(self.proposal)
+        return (*self.patient.remarks, *doubt, *found)
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether a fit makes sense."""
+        return all(finding.kind != "error" for finding in self.findings)
+
+    @property
+    def alignment(self) -> str:
+        """How it was moved to the atlas, a sentence; empty where it was not."""
+        return "" if self.proposal is None else _told(self.method, self.proposal)
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """All of it for people, in the order in which it was done."""
+        aligned = (self.alignment,) if self.alignment else ()
+        volume_cm3 = self.patient.volume_cm3
+        measured = () if volume_cm3 is None else (f"its own volume is {volume_cm3:.2f} cm³",)
+        return (f"read {self.patient.source}", *self.repairs, *aligned, *self.remarks, *measured)
+
+    def to_json(self) -> dict[str, Any]:
+        """The same for programs; the matrix leads from the file's coordinates to the atlas frame."""
+        return {
+            "source": self.patient.source,
+            "volume_cm3": self.patient.volume_cm3,
+            "repairs": list(self.repairs),
+            "remarks": list(self.remarks),
+            "alignment": None if self.proposal is None else _distances(self.method, self.proposal),
+            "file_to_atlas": self.patient.from_file.tolist(),
+        }
+
+
+def take_in(
+    path: Path,
+    atlas: Atlas,
+    known: Values,
+    *,
+    label: int | str | None = None,
+    scale: float | None = None,
+    align: Method = "none",
+    landmarks: Path | None = None,
+    should_stop: StopCheck | None = None,
+) -> Intake:
+    """Read a patient's file and bring it into the frame of an atlas: :func:`read`, then :func:`aligned`.
+
+    Args:
+        path: a mesh, whole or in part, a label volume or a cloud of points.
+        atlas: whose frame and shape count.
+        known: covariates in real units; the patient is aligned to the atlas's shape at them.
+        label: which label of a volume, its number or its name.
+        scale: millimetres per unit of the file; left out, it is guessed where the size is implausible.
+        align: ``none``, ``icp`` or ``landmarks``.
+        landmarks: a CSV name,x,y,z in the coordinates of the file; for ``landmarks``.
+        should_stop: polled while the atlas's shape is made and the motion is sought.
+
+    Raises:
+        InputError: when the file cannot be read or aligned, or what is wrong with it cannot be repaired.
+        Cancelled: when ``should_stop()`` turned true.
+    """
+    intake = aligned(read(path, atlas, label, scale), atlas, known, align, landmarks, should_stop)
+    _stop_at_errors(path, intake.findings)
+    return intake
+
+
+def labels(path: str | Path) -> dict[int, str] | None:
+    """What :func:`read` may be asked for: of a label volume its labels, each with its name and size.
+
+    Returns:
+        A title by label, as ``{2: "2 'airway': 41.9 cm3"}``, empty where every voxel is 0; None of a file
+        that is no label volume.
+
+    Raises:
+        InputError: when a label volume cannot be used.
+    """
+    if not Path(path).name.lower().endswith(volumes.ENDINGS):
+        return None
+    return volumes.titles(volumes.read_labels(path))
+
+
+def read(path: Path, atlas: Atlas, label: int | str | None = None, scale: float | None = None) -> Intake:
+    """Read a patient's file, repair what can be repaired and find what is still the matter.
+
+    Args:
+        path: a mesh, whole or in part, a label volume or a cloud of points.
+        atlas: whose frame tells what is a plausible size and place.
+        label: which label of a volume, its number or its name; see :func:`labels`.
+        scale: millimetres per unit of the file; left out, it is guessed where the size is implausible.
+
+    Raises:
+        InputError: when the file cannot be read, or has an error that neither a repair nor an alignment
+            mends.
+    """
+    patient, done, left = repaired(_in_units(read_patient(path, label), scale), atlas.frame)
+    _stop_at_errors(path, [finding for finding in left if finding.topic != "far"])
+    return Intake(patient, tuple(f"{one.sentence}; repaired: {one.remedy}" for one in done), left)
+
+
+def aligned(
+    intake: Intake,
+    atlas: Atlas,
+    known: Values,
+    method: Method,
+    landmarks: Path | None = None,
+    should_stop: StopCheck | None = None,
+) -> Intake:
+    """The patient moved onto the atlas's shape; who declines the proposal keeps ``intake``.
+
+    Args:
+        intake: from :func:`read`; it is not changed.
+        atlas: whose shape counts.
+        known: covariates in real units; the patient is aligned to the atlas's shape at them.
+        method: ``icp``, ``landmarks``, or ``none`` to leave everything as it is.
+        landmarks: a CSV name,x,y,z in the coordinates of the file; for ``landmarks``.
+        should_stop: polled while the atlas's shape is made and the motion is sought.
+
+    Raises:
+        InputError: when landmarks are missing or too few, or no shape is there to align to.
+        Cancelled: when ``should_stop()`` turned true.
+    """
+    points = _landmarks(method, landmarks)
+    if method == "none":
+        return intake
+    proposal = _proposal(intake.patient, atlas, known, method, points, should_stop)
+    patient = moved(intake.patient, proposal.transform)
+    return Intake(patient, intake.repairs, check_patient(patient, atlas.frame), method, proposal)
+
+
+def _landmarks(align: Method, path: Path | None) -> Landmarks:
+    if (align == "landmarks") != (path is not None):
+        raise InputError(
+            "alignment by landmarks and a file of them (--align landmarks, --landmarks FILE.csv) need each "
+            "other; give both or neither"
+        )
+    return {} if path is None else read_landmarks(path)
+
+
+def _in_units(patient: Patient, scale: float | None) -> Patient:
+    if scale is None:
+        return patient
+    if not 0 < scale < math.inf:
+        raise InputError(f"the scale is {scale:g}; give the millimetres per unit of the file, as 1000")
+    return replace(scaled(patient, scale), units_known=True)
+
+
+def _stop_at_errors(path: Path, findings: Sequence[Finding]) -> None:
+    for finding in findings:
+        if finding.kind == "error":
+            raise InputError(f"{path.name}: {finding.sentence}; {finding.remedy}")
+
+
+def _proposal(
+    patient: Patient,
+    atlas: Atlas,
+    known: Values,
+    align: Method,
+    landmarks: Landmarks,
+    should_stop: StopCheck | None,
+) -> Proposal:
+    reference_mm = atlas.shape(known, should_stop=should_stop)
+    if not len(reference_mm.faces):
+        raise InputError("there is no surface at these covariates to align to; give others as known")
+    carried = {name: _moved_point(patient, point) for name, point in landmarks.items()}
+    alignment = atlas.checkpoint.alignment
+    return propose(align, patient.mesh_mm, reference_mm, alignment, carried, should_stop)
+
+
+def _moved_point(patient: Patient, point: tuple[float, float, float]) -> tuple[float, float, float]:
+    x, y, z = (patient.from_file @ np.array([*point, 1.0]))[:3].tolist()
+    return x, y, z
+
+
+def _distances(method: Method, proposal: Proposal) -> dict[str, Any]:
+    numbers = {name: value for name, value in asdict(proposal).items() if name != "transform"}
+    return {"method": method, **numbers}
+
+
+def _told(method: Method, proposal: Proposal) -> str:
+    away = "" if proposal.landmarks_mm is None else f", landmarks {proposal.landmarks_mm:.2f} mm apart"
+    ends = f"{proposal.before_mm:.2f} mm before, {proposal.after_mm:.2f} mm after"
+    turn = f"turned by {proposal.turned_deg:.0f}°"
+    return f"aligned by {method}, {turn}; mean distance to the atlas's shape {ends}{away}"
+
+
+def _doubt(proposal: Proposal) -> tuple[str, ...]:
+    if proposal.rival_deg is None:
+        return ()
+    other = f"the shape turned by another {proposal.rival_deg:.0f}° fits nearly as well"
+    return (f"{other}; look whether it is upright, or align it by landmarks",)

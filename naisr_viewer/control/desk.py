@@ -1,0 +1,253 @@
+"""What the user does with patients: open, align, fit, compare, read again, close."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, replace
+from itertools import count
+from pathlib import Path
+
+from PySide6.QtCore import QFileSystemWatcher, QObject
+
+from naisr_viewer.control.controller import Controller, Task
+from naisr_viewer.control.worker import Deliver
+from naisr_viewer.engine.clinic import Clinic
+from naisr_viewer.state.explorer import Layout, label, showing, with_patient, without_patient
+from naisr_viewer.state.patients import Fitted, Labels, Named, Patient, Reading, Scan
+from naisr_viewer.state.requests import Progress, ShouldStop
+from naisr_viewer.views.main_window import MainWindow
+
+Stamp = tuple[int, int] | None
+"""When a file was written (ns) and its size; None where there is none."""
+
+
+@dataclass(frozen=True)
+class Order:
+    """A patient's file to be read.
+
+    Attributes:
+        key: of the patient, new or known.
+        reading: how.
+        known: what is known of the covariates.
+    """
+
+    key: int
+    reading: Reading
+    known: Named
+
+
+@dataclass(frozen=True, eq=False)
+class Read:
+    """A scan that was read as ordered, or a choice of labels that stands before it."""
+
+    order: Order
+    stamp: Stamp
+    found: Scan | Labels
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A fit of this patient that came to its end."""
+
+    key: int
+    scan: Scan
+    known: Named
+    fit: Fitted
+
+
+class PatientDesk(QObject):
+    """Wires the patient panel.
+
+    Args:
+        window: shows the patients.
+        controller: holds the state and runs the jobs.
+        clinic: reads and fits.
+    """
+
+    def __init__(self, window: MainWindow, controller: Controller, clinic: Clinic) -> None:
+        super().__init__(controller)
+        self._window, self._controller, self._clinic = window, controller, clinic
+        self._keys = count(1)
+        self._waiting: deque[Order] = deque()
+        self._stamps: dict[int, Stamp] = {}
+        self._files = QFileSystemWatcher(self)
+        self._files.fileChanged.connect(self._look_at_files)
+        self._files.directoryChanged.connect(self._look_at_files)
+        controller.settled.connect(self._read_next)
+        controller.settled.connect(self._watch)
+        controller.produced.connect(self._produced)
+        window.scan_requested.connect(self.open)
+        panel = window.patients
+        panel.patient_chosen.connect(self.show)
+        panel.close_requested.connect(self.close)
+        panel.reading_changed.connect(self.read_differently)
+        panel.reread_requested.connect(self.read_again)
+        panel.fit_requested.connect(self.fit)
+        panel.compared_chosen.connect(self.compare)
+        panel.ghost_toggled.connect(self.set_ghost)
+
+    def open(self, path: Path) -> None:
+        """Read a patient's file beside the window, and show it over the population's average."""
+        if self._controller.state.atlas is None:
+            self._window.show_error("Open an atlas first; a scan is fitted to it.")
+            return
+        reading = Reading(path.absolute())
+        self._read(Order(next(self._keys), reading, self._known_of(reading)))
+
+    def show(self, key: int | None) -> None:
+        """Show another patient, or the population average."""
+        self._controller.go(showing(self._controller.state, key))
+
+    def close(self, key: int) -> None:
+        """Forget a patient."""
+        patient = self._controller.state.find(key)
+        if patient is None:
+            return
+        self._controller.go(without_patient(self._controller.state, key))
+        if patient.fit is not None:
+            self._clinic.forget(patient.fit)
+        self._watch()
+
+    def read_differently(self, reading: Reading) -> None:
+        """Read the patient's file with another unit or alignment."""
+        patient, known = self._controller.state.shown, self._window.patients.known.given()
+        if self._is_refused(known):
+            self._window.show_state(self._controller.state)
+        elif patient is not None:
+            self._read(Order(patient.key, reading, known))
+
+    def read_again(self) -> None:
+        """Read the patient's file anew, as another patient, so that both can be compared."""
+        patient = self._controller.state.shown
+        if patient is not None:
+            self._read(Order(next(self._keys), patient.reading, self._window.patients.known.given()))
+
+    def fit(self, known: Named) -> None:
+        """Fit the atlas to the patient that is shown; covariates that are not known are inferred."""
+        state, clinic = self._controller.state, self._clinic
+        atlas, patient = state.atlas, state.shown
+        if atlas is None or patient is None or self._is_refused(known):
+            return
+
+        def job(deliver: Deliver, progress: Progress, should_stop: ShouldStop) -> None:
+            fit = clinic.fit(atlas.path, patient.scan, known, progress, should_stop)
+            deliver(Found(patient.key, patient.scan, known, fit))
+
+        self._controller.run(Task.FITTING, f"Fitting {patient.name} …", job)
+
+    def compare(self, key: int | None) -> None:
+        """Count changes from another patient; None for this patient as fitted."""
+        self._controller.go(replace(self._controller.state, compared=key))
+
+    def set_ghost(self, has_ghost: bool) -> None:
+        """Whether the scan is drawn over the full shape."""
+        self._controller.go(replace(self._controller.state, has_ghost=has_ghost))
+
+    def _is_refused(self, known: Named) -> bool:
+        """Whether a covariate is where the atlas knows nobody; says so."""
+        atlas = self._controller.state.atlas
+        assert atlas is not None
+        for name, value in known:
+            covariate = atlas.covariates[atlas.index(name)]
+            low, high = covariate.range
+            if not low <= value <= high:
+                self._window.show_error(
+                    f"{label(name)} is {covariate.format(value)}; the atlas was made from {low:g} to "
+                    f"{covariate.format(high)}. Correct it, or untick it to have it inferred."
+                )
+                return True
+        return False
+
+    def _read(self, order: Order) -> None:
+        """Read now, or when what is under way has ended."""
+        self._waiting.append(order)
+        self._read_next()
+
+    def _read_next(self) -> None:
+        atlas, clinic = self._controller.state.atlas, self._clinic
+        if atlas is None or not self._waiting or self._controller.is_occupied:
+            return
+        order = self._waiting.popleft()
+
+        def job(deliver: Deliver, progress: Progress, should_stop: ShouldStop) -> None:
+            stamp = stamp_of(order.reading.path)
+            labels = clinic.labels(order.reading)
+            found = labels or clinic.read(atlas.path, order.reading, order.known, should_stop)
+            deliver(Read(order, stamp, found))
+
+        self._controller.run(Task.READING, f"Reading {order.reading.path.name} …", job)
+
+    def _produced(self, item: object) -> None:
+        if isinstance(item, Read) and isinstance(item.found, Labels):
+            label = self._window.ask_label(item.found)
+            if label is not None:
+                self._read(replace(item.order, reading=replace(item.order.reading, label=label)))
+        elif isinstance(item, Read) and isinstance(item.found, Scan):
+            self._show_read(item.order, item.stamp, item.found)
+        elif isinstance(item, Found):
+            self._show_fit(item)
+
+    def _show_read(self, order: Order, stamp: Stamp, scan: Scan) -> None:
+        """A scan that was read differently has to be fitted again."""
+        old = self._controller.state.find(order.key)
+        name = old.name if old is not None else self._name(order.reading)
+        patient = Patient(order.key, name, order.reading, scan, order.known)
+        self._stamps[order.key] = stamp
+        self._controller.go(with_patient(self._controller.state, patient))
+        if old is not None and old.fit is not None:
+            self._clinic.forget(old.fit)
+        self._watch()
+        self._look_at_files()
+
+    def _show_fit(self, found: Found) -> None:
+        patient = self._controller.state.find(found.key)
+        if patient is None or patient.scan is not found.scan:
+            self._clinic.forget(found.fit)
+            return
+        state = with_patient(self._controller.state, replace(patient, known=found.known, fit=found.fit))
+        layout = Layout.FIT if patient.fit is None else state.layout
+        self._controller.go(replace(state, layout=layout))
+        if patient.fit is not None:
+            self._clinic.forget(patient.fit)
+
+    def _known_of(self, reading: Reading) -> Named:
+        """What is known of an open patient with the same file."""
+        state = self._controller.state
+        same = (each.known for each in reversed(state.patients) if each.reading.path == reading.path)
+        return next(same, ())
+
+    def _name(self, reading: Reading) -> str:
+        """The file's name, numbered where it is open already."""
+        names = {each.name for each in self._controller.state.patients}
+        plain = reading.path.name
+        numbered = (f"{plain} ({number})" for number in count(2))
+        return plain if plain not in names else next(name for name in numbered if name not in names)
+
+    def _watch(self) -> None:
+        """Be told when another program writes one of the files; a new file is news of its folder."""
+        paths = {each.reading.path for each in self._controller.state.patients}
+        wanted = {str(place) for path in paths for place in (path, path.parent) if place.exists()}
+        watched = {*self._files.files(), *self._files.directories()}
+        if watched - wanted:
+            self._files.removePaths(list(watched - wanted))
+        if wanted - watched:
+            self._files.addPaths(list(wanted - watched))
+
+    def _look_at_files(self) -> None:
+        state = self._controller.state
+        patients = tuple(
+            replace(each, is_changed=stamp_of(each.reading.path) not in (None, self._stamps[each.key]))
+            for each in state.patients
+        )
+        if [each.is_changed for each in patients] != [each.is_changed for each in state.patients]:
+            self._controller.go(replace(state, patients=patients))
+        self._watch()
+
+
+def stamp_of(path: Path) -> Stamp:
+    """What changes when a file is written."""
+    try:
+        facts = path.stat()
+    except OSError:
+        return None
+    return facts.st_mtime_ns, facts.st_size

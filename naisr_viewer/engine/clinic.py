@@ -1,0 +1,146 @@
+"""Patients for the engine: files read and aligned, shapes fitted. Knows no Qt."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+
+from naisr_viewer.engine.engine import Engine
+from naisr_viewer.engine.members import Member
+from naisr_viewer.state.explorer import FULL_SHAPE
+from naisr_viewer.state.patients import Fitted, Labels, Named, Reading, Scan
+from naisr_viewer.state.requests import EXACT_RESOLUTION, Progress, ShouldStop, SurfaceRequest
+
+if TYPE_CHECKING:
+    from naisr_model.patients.intake import Intake
+
+SHOWN_FACES = 20_000
+"""A scan is thinned to so many for display and for its distances to a shape; the fit uses all of it."""
+
+SHOWN_POINTS = SHOWN_FACES // 2
+FIT_SHARE = 0.8
+"""Of a fit's progress; the rest is the surface that its volume is measured on."""
+
+
+class Clinic:
+    """Keeps the whole of every scan that somebody still holds, in the frame of its atlas.
+
+    Args:
+        engine: holds the atlases, and answers for everyone who was fitted.
+    """
+
+    def __init__(self, engine: Engine) -> None:
+        self._engine = engine
+        self._intakes: WeakKeyDictionary[Scan, Intake] = WeakKeyDictionary()
+
+    def labels(self, reading: Reading) -> Labels | None:
+        """What to choose from, where a label volume has several labels and none is chosen.
+
+        Raises:
+            InputError: when a label volume cannot be used.
+        """
+        from naisr_model.patients import intake
+
+        titles = intake.labels(reading.path) if reading.label is None else None
+        return Labels(reading, tuple(titles.items())) if titles and len(titles) > 1 else None
+
+    def read(
+        self, atlas: Path, reading: Reading, known: Named, should_stop: ShouldStop | None = None
+    ) -> Scan:
+        """Read a patient's file as asked and bring it into the frame of an open atlas.
+
+        Args:
+            atlas: file of the open atlas.
+            reading: what to read and how to align it.
+            known: covariates; an alignment is to the atlas's shape at them.
+            should_stop: polled during an alignment.
+
+        Raises:
+            InputError: when the file cannot be used.
+            Cancelled: when ``should_stop()`` turned true.
+        """
+        from naisr_model.patients import intake
+
+        model = self._engine.atlas(atlas)
+        taken = intake.read(reading.path, model, reading.label, reading.scale)
+        if reading.align != "none":
+            taken = intake.aligned(taken, model, dict(known), reading.align, reading.landmarks, should_stop)
+        scan = _scan(taken)
+        self._intakes[scan] = taken
+        return scan
+
+    def fit(
+        self,
+        atlas: Path,
+        scan: Scan,
+        known: Named,
+        progress: Progress,
+        should_stop: ShouldStop | None = None,
+    ) -> Fitted:
+        """Fit an open atlas to a patient that :meth:`read` has read; the engine then knows the person.
+
+        Raises:
+            InputError: when the shape cannot be fitted.
+            Cancelled: when ``should_stop()`` turned true.
+        """
+        model, patient = self._engine.atlas(atlas), self._intakes[scan].patient
+        shape = patient.mesh_mm.vertices if patient.is_cloud else patient.mesh_mm
+        fit = model.fit(
+            shape, dict(known), progress=lambda share: progress(FIT_SHARE * share), should_stop=should_stop
+        )
+        values = tuple(fit.covariates.items())
+        person = self._engine.admit(Member(atlas, fit, scan))
+        try:
+            surface = self._engine.surface(
+                SurfaceRequest(atlas, FULL_SHAPE, values, EXACT_RESOLUTION, person),
+                lambda share: progress(FIT_SHARE + (1 - FIT_SHARE) * share),
+                should_stop,
+            )
+        except BaseException:
+            self._engine.dismiss(person)
+            raise
+        return Fitted(
+            person=person,
+            values=values,
+            intervals=tuple((name, *ends) for name, ends in fit.intervals.items()),
+            volume_cm3=surface.volume_cm3,
+            volume_margin_cm3=surface.volume_margin_cm3,
+            residual_mm=fit.residual_mm,
+            lasting=fit.lasting,
+            seconds=fit.seconds,
+            remarks=fit.remarks,
+        )
+
+    def forget(self, fit: Fitted) -> None:
+        """A fit that nobody asks for any more."""
+        self._engine.dismiss(fit.person)
+
+
+def _scan(taken: Intake) -> Scan:
+    """A scan as the window shows it."""
+    from naisr_model.data.patients import decimated
+
+    whole = taken.patient
+    thin = decimated(whole, SHOWN_FACES) if len(whole.mesh_mm.faces) > SHOWN_FACES else whole
+    blocked = [f"{one.sentence}; {one.remedy}" for one in taken.findings if one.kind == "error"]
+    points_mm = _thinned(thin.mesh_mm.vertices) if thin.is_cloud else thin.mesh_mm.vertices
+    normals = np.zeros_like(points_mm) if thin.is_cloud else thin.mesh_mm.vertex_normals
+    return Scan(
+        points_mm=np.array(points_mm, np.float32),  # a plain array: trimesh's own remember their mesh
+        normals=np.array(normals, np.float32),
+        faces=np.asarray(thin.mesh_mm.faces, np.int64).reshape(-1, 3),
+        source=whole.source,
+        volume_cm3=whole.volume_cm3,
+        alignment=taken.alignment,
+        notes=(*taken.repairs, *(remark for remark in taken.remarks if remark not in blocked)),
+        blocked=" ".join(blocked),
+    )
+
+
+def _thinned(points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A cloud for display."""
+    return points_mm[:: -(-len(points_mm) // SHOWN_POINTS)]

@@ -1,0 +1,133 @@
+"""Surfaces to files in millimetres, each with a record of what it is beside it. No Qt."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from naisr_model.errors import InputError
+from naisr_model.files import replacing
+from naisr_viewer import __version__
+from naisr_viewer.state.explorer import AtlasCard, Covariate, panel_title
+from naisr_viewer.state.patients import Patient
+from naisr_viewer.state.requests import FORMATS, SurfaceResult
+
+
+def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
+    """Let ``write`` fill a temporary file in the folder of ``path``, then put it in place.
+
+    Raises:
+        InputError: when the folder cannot be written to.
+    """
+    try:
+        with replacing(path) as temporary:
+            write(temporary)
+    except OSError as error:
+        raise InputError(f"cannot write {path}: {error.strerror or error}; choose another folder") from error
+
+
+def write_surface(
+    path: Path, result: SurfaceResult, atlas: AtlasCard, patient: Patient | None = None
+) -> tuple[Path, Path]:
+    """Write a surface and, beside it, a JSON record of what it shows.
+
+    Args:
+        path: the mesh file; its ending is one of :data:`FORMATS`.
+        result: the surface, in millimetres.
+        atlas: where it came from.
+        patient: whose it is; None for the population average.
+
+    Returns:
+        The mesh file and the record.
+
+    Raises:
+        InputError: when there is no surface to write, or the ending or folder will not do.
+    """
+    if len(result.faces) == 0:
+        raise InputError(
+            f"{panel_title(result.request.panel)} has no surface at these values; nothing to write"
+        )
+    ending = path.suffix.lower().removeprefix(".")
+    if ending not in FORMATS:
+        raise InputError(f"cannot write '{path.name}'; the ending must be one of {', '.join(FORMATS)}")
+    beside = path.with_suffix(".json")
+    write_atomically(path, lambda place: _write_mesh(place, ending, result))
+    text = json.dumps(description(result, atlas, path.name, patient), indent=2, ensure_ascii=False) + "\n"
+    write_atomically(beside, lambda place: place.write_text(text, encoding="utf-8"))
+    return path, beside
+
+
+def description(
+    result: SurfaceResult, atlas: AtlasCard, file_name: str, patient: Patient | None = None
+) -> dict[str, Any]:
+    """What a mesh file shows, as plain JSON."""
+    request, margin = result.request, result.volume_margin_cm3
+    given = dict(request.values)
+    return {
+        "file": file_name,
+        "atlas": atlas.name,
+        "atlas_file": atlas.path.name,
+        "view": panel_title(request.panel),
+        "covariates": {c.name: _covariate_record(c, given.get(c.name, c.centre)) for c in atlas.covariates},
+        "depends_on": sorted(given),
+        "length_unit": "mm",
+        "volume_cm3": round(result.volume_cm3, 4),
+        "volume_95_percent_margin_cm3": None if margin is None else round(margin, 4),
+        "patient": None if patient is None else _patient_record(patient),
+        "vertices": len(result.points_mm),
+        "triangles": len(result.faces),
+        "lattice_resolution": request.resolution,
+        "program": f"naisr-viewer {__version__}",
+    }
+
+
+def file_stem(atlas: AtlasCard, result: SurfaceResult, patient: Patient | None = None) -> str:
+    """A telling file name without an ending: ``airway-age-only``, ``airway-p01-full-shape``."""
+    person = "" if patient is None else f"{_plain_name(patient)}-"
+    words = f"{atlas.name}-{person}{panel_title(result.request.panel)}".lower()
+    return "-".join(words.replace("/", " ").split())
+
+
+def _plain_name(patient: Patient) -> str:
+    """The name without the file's ending and without parentheses: ``p01.stl (2)`` is ``p01 2``."""
+    file = patient.reading.path.name
+    stem = file.removesuffix(".gz").rpartition(".")[0] or file
+    return patient.name.replace(file, stem).replace("(", "").replace(")", "")
+
+
+def _patient_record(patient: Patient) -> dict[str, Any]:
+    """Who it is, and what of the covariates is known of them; the rest was inferred."""
+    fit = patient.fit
+    return {
+        "scan": patient.reading.path.name,
+        "known": dict(patient.known),
+        "fitted": None if fit is None else dict(fit.values),
+        "residual_mm": None if fit is None else round(fit.residual_mm, 4),
+        "lasting": None if fit is None else round(fit.lasting, 4),
+    }
+
+
+def _covariate_record(covariate: Covariate, value: float) -> dict[str, Any]:
+    record: dict[str, Any] = {"value": value, "unit": covariate.unit}
+    if covariate.kind == "binary":
+        record["reading"] = covariate.format(value)
+    return record
+
+
+def _write_mesh(path: Path, ending: str, result: SurfaceResult) -> None:
+    if ending == "vtp":
+        import pyvista as pv  # here, and trimesh below, because they would slow down the start
+
+        mesh = pv.PolyData.from_regular_faces(result.points_mm, result.faces)
+        mesh.point_data.active_normals = result.normals
+        mesh.save(path)
+        return
+    import trimesh
+
+    points = np.asarray(result.points_mm, dtype=np.float64)
+    surface = trimesh.Trimesh(points, result.faces, vertex_normals=result.normals, process=False)
+    surface.export(path, file_type=ending)

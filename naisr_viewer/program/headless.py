@@ -1,0 +1,114 @@
+"""The same window without a person or a display: screenshots and the demonstration."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtCore import QCoreApplication, QEventLoop, Qt
+from PySide6.QtTest import QTest
+
+from naisr_model.errors import InputError
+from naisr_viewer.control.controller import Controller
+from naisr_viewer.files import surfaces
+from naisr_viewer.state.explorer import FULL_SHAPE, Layout, all_panels
+from naisr_viewer.state.requests import EXACT_RESOLUTION, ExportChoice
+from naisr_viewer.views.covariates.panel import CovariateRow
+from naisr_viewer.views.covariates.slider import SLIDER_STEPS
+from naisr_viewer.views.main_window import MainWindow
+
+DEADLINE_S = 600.0
+"""Nothing on screen takes longer than this, even on a slow machine."""
+
+DRAG_STEPS = 24
+FRAME_S = 0.03
+
+
+def wait_until(condition: Callable[[], bool], seconds: float = DEADLINE_S) -> None:
+    """Run the window until ``condition`` holds.
+
+    Raises:
+        InputError: when it does not within ``seconds``.
+    """
+    end = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > end:
+            raise InputError(f"gave up after {seconds:g} s; the machine is too slow or the atlas too large")
+        QCoreApplication.processEvents(QEventLoop.ProcessEventsFlag.AllEvents, 20)
+        time.sleep(0.002)
+
+
+def pause(seconds: float) -> None:
+    """Let the window and the worker go on; ``QTest.qWait`` would keep Python from the worker."""
+    end = time.monotonic() + seconds
+    wait_until(lambda: time.monotonic() > end)
+
+
+def finish(window: MainWindow, controller: Controller) -> None:
+    """Wait until the window is exact.
+
+    Raises:
+        InputError: when the window reports an error instead.
+    """
+    wait_until(lambda: window.shapes.is_ready and not controller.is_busy)
+    if window.error_text.text():
+        raise InputError(window.error_text.text())
+
+
+def take_screenshot(window: MainWindow, controller: Controller, path: Path) -> None:
+    """Write a picture of the window once everything on it is exact."""
+    finish(window, controller)
+    controller.save_screenshot(path)
+    print(f"wrote {path}")
+
+
+def drag(row: CovariateRow, start: float, end: float) -> None:
+    """Drag a slider between two shares of its range with the mouse, letting the window follow."""
+    slider, left = row.slider, Qt.MouseButton.LeftButton
+    QTest.mousePress(slider, left, pos=slider.place_of(start))
+    for step in range(1, DRAG_STEPS + 1):
+        QTest.mouseMove(slider, slider.place_of(start + (end - start) * step / DRAG_STEPS))
+        pause(FRAME_S)
+    QTest.mouseRelease(slider, left, pos=slider.place_of(end))
+
+
+def run_demo(window: MainWindow, controller: Controller, folder: Path) -> None:
+    """Drag every slider from end to end with real mouse events; leave pictures and meshes behind.
+
+    At last a full shape that was exported is opened as if it were a patient's, fitted and moved.
+
+    Raises:
+        InputError: when the window reports an error.
+    """
+
+    def picture(name: str) -> None:
+        finish(window, controller)
+        controller.save_screenshot(folder / f"{name}.png")
+
+    picture("start")
+    for name, row in window.covariates.rows.items():
+        drag(row, 0.5, 1.0)
+        picture(f"{name}-high")
+        drag(row, 1.0, 0.0)
+        picture(f"{name}-low")
+        row.reset.click()
+        print(f"dragged {name} from {row.reach}", flush=True)
+    controller.set_layout(Layout.FULL_SHAPE)
+    name, row = next(iter(window.covariates.rows.items()))
+    drag(row, 0.5, 0.75)
+    picture("full-shape")
+    atlas = controller.state.atlas
+    assert atlas is not None
+    controller.export(ExportChoice(all_panels(atlas), "stl", EXACT_RESOLUTION, folder))
+    finish(window, controller)
+    row.reset.click()
+    window.scan_requested.emit(folder / f"{surfaces.file_stem(atlas, controller.shown[FULL_SHAPE])}.stl")
+    finish(window, controller)
+    window.patients.known.fit.click()
+    picture("patient-fit")
+    controller.set_layout(Layout.CHANGE)
+    drag(row, row.slider.sliderPosition() / SLIDER_STEPS, 0.25)
+    picture("patient-before-and-after")
+    print(f"fitted the exported full shape and moved it along {name}")
+    print(f"wrote pictures and meshes into {folder.absolute()}")

@@ -1,0 +1,263 @@
+"""The right side: the scans that are open, and of the one that is shown all there is to say and to do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+from PySide6.QtCore import QEvent, QObject, QSignalBlocker, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import (
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QListWidget,
+    QListWidgetItem,
+    QScrollArea,
+    QSizePolicy,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from naisr_model.covariates import Covariate
+from naisr_viewer.state.explorer import ExplorerState
+from naisr_viewer.state.patients import Named, Patient
+from naisr_viewer.views.patients.known import KnownPart, NumberField
+from naisr_viewer.views.patients.pieces import button, exchange, paragraph
+from naisr_viewer.views.patients.result import ComparePart, result_part
+from naisr_viewer.views.patients.scan import AlignmentPart, ScanPart
+from naisr_viewer.words.numbers import volume
+
+PANEL_WIDTH = 300
+ROWS_IN_SIGHT = 4
+"""How many rows of the list are shown before it scrolls."""
+
+ROW_HEIGHT = 30
+LIST_BORDER = 8
+
+INVITATION = "Open a scan to fit the atlas to it: a mesh, a label volume or a cloud of points."
+AVERAGE = "Population average"
+
+
+class ElidedLabel(QLabel):
+    """One line that is shortened in its middle where it does not fit."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        """As much of the text as there is room for."""
+        text = self.fontMetrics().elidedText(self.text(), Qt.TextElideMode.ElideMiddle, self.width())
+        painter = QPainter(self)
+        painter.drawText(self.rect(), Qt.AlignmentFlag.AlignVCenter, text)
+        painter.end()
+
+
+class PatientList(QListWidget):
+    """The population average and the open patients."""
+
+    patient_chosen = Signal(object)  # key, or None for the population average
+    close_requested = Signal(int)  # key
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setObjectName("patientList")
+        self.setAccessibleName("Patients")
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.currentItemChanged.connect(lambda _item: self.patient_chosen.emit(self._key()))
+        self._patients: tuple[Patient, ...] = ()
+
+    def show_patients(self, patients: tuple[Patient, ...], shown: int | None) -> None:
+        """Bring the rows up to date and mark the one that is shown."""
+        with QSignalBlocker(self):
+            if patients != self._patients:
+                self._patients = patients
+                self._fill()
+            self.setCurrentRow([None, *(patient.key for patient in patients)].index(shown))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Delete closes the patient."""
+        key = self._key()
+        if event.key() == Qt.Key.Key_Delete and key is not None:
+            self.close_requested.emit(key)
+        else:
+            super().keyPressEvent(event)
+
+    def _fill(self) -> None:
+        self.clear()
+        self._add(AVERAGE, "", "The atlas without anybody's own shape")
+        for patient in self._patients:
+            found = volume(patient.fit.volume_cm3) if patient.fit else "not fitted"
+            close = self._close_button(patient)
+            self._add(patient.name, found, str(patient.reading.path), patient.key, close)
+        self.setFixedHeight(min(self.count(), ROWS_IN_SIGHT) * ROW_HEIGHT + LIST_BORDER)
+
+    def _add(self, name: str, note: str, tip: str, key: int | None = None, *beside: QWidget) -> None:
+        item = QListWidgetItem(self)
+        item.setData(Qt.ItemDataRole.UserRole, key)
+        item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{name}, {note}".removesuffix(", "))
+        item.setToolTip(tip)
+        item.setSizeHint(QSize(0, ROW_HEIGHT))
+        muted = QLabel(note)
+        muted.setObjectName("muted")
+        row = QWidget()
+        line = QHBoxLayout(row)
+        line.setContentsMargins(9, 0, 4, 0)
+        line.setSpacing(6)
+        line.addWidget(ElidedLabel(name), 1)
+        for widget in (muted, *beside):
+            line.addWidget(widget)
+        self.setItemWidget(item, row)
+
+    def _close_button(self, patient: Patient) -> QToolButton:
+        close = QToolButton()
+        close.setText("×")
+        close.setAutoRaise(True)
+        close.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        close.setToolTip("Close this patient (Delete); the file stays as it is")
+        close.setAccessibleName(f"Close {patient.name}")
+        close.clicked.connect(lambda: self.close_requested.emit(patient.key))
+        return close
+
+    def _key(self) -> int | None:
+        item = self.currentItem()
+        return item.data(Qt.ItemDataRole.UserRole) if item else None
+
+
+class PatientPanel(QFrame):
+    """The open scans, and of the one that is shown all there is to say and to do."""
+
+    open_requested = Signal()  # "Open scan…" was pressed
+    patient_chosen = Signal(object)  # key, or None for the population average
+    close_requested = Signal(int)  # key
+    reread_requested = Signal()  # the shown patient's file shall be read again
+    reading_changed = Signal(object)  # a Reading of the same file with another alignment or unit
+    fit_requested = Signal(tuple)  # Named, the known covariates in the atlas's order
+    compared_chosen = Signal(object)  # key, or None for the patient as fitted
+    ghost_toggled = Signal(bool)  # whether the scan is drawn over the shape
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("patientBar")
+        self.setFixedWidth(PANEL_WIDTH)
+        self._state = ExplorerState()
+        self._drafts: dict[int, Named] = {}
+        self._area = QScrollArea(self)
+        self._inside = QWidget(self._area)
+        self.open = button("Open scan…", "A mesh, a label volume or a cloud of points")
+        self.open.setParent(self._inside)  # the Tab key comes to what is taken in first
+        self.invitation = paragraph(INVITATION, "muted")
+        self.list = PatientList(self._inside)
+        self.scan = ScanPart(self._inside)
+        self.alignment = AlignmentPart(self._inside)
+        self.known = KnownPart(self._inside)
+        self.result = QWidget()
+        self.compare = ComparePart(self._inside)
+        self._compose()
+        self._connect()
+        self.show_state(self._state)
+
+    def show_state(self, state: ExplorerState) -> None:
+        """Bring the panel to ``state``, touching only what changed; what is being typed stays."""
+        old, self._state = self._state, state
+        if state.atlas is not None and state.atlas is not old.atlas:
+            self._drafts = {}
+            self._show_rows(state.atlas.covariates)
+        self._show_known(old.shown if state.atlas is old.atlas else None, state.shown)
+        self.open.setEnabled(state.atlas is not None)
+        self.invitation.setVisible(not state.patients)
+        self.list.setVisible(bool(state.patients))
+        self.list.show_patients(state.patients, state.patient)
+        for part in (self.scan, self.alignment, self.known):
+            part.setVisible(state.shown is not None)
+        for found in (self.result, self.compare):
+            found.setVisible(state.fit is not None)
+        if state.shown is not None:
+            self._show_patient(state.shown, old.shown)
+
+    def set_editable(self, editable: bool) -> None:
+        """Whether anything can be changed just now; it can be read and scrolled in any case."""
+        self._inside.setEnabled(editable)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Let the wheel scroll the panel instead of changing what lies under the pointer."""
+        if event.type() != QEvent.Type.Wheel or (isinstance(watched, NumberField) and watched.hasFocus()):
+            return super().eventFilter(watched, event)
+        event.ignore()
+        return True
+
+    def _show_known(self, old: Patient | None, new: Patient | None) -> None:
+        """What was typed belongs to its patient and is found again when that is shown again."""
+        if old is not None and (new is None or new.key != old.key):
+            self._drafts[old.key] = self.known.given()
+        open_keys = {patient.key for patient in self._state.patients}
+        self._drafts = {key: draft for key, draft in self._drafts.items() if key in open_keys}
+        if new is None:
+            return
+        if old is None or old.key != new.key:
+            self.known.give(self._drafts.get(new.key, new.known))
+        elif new.known and new.known != old.known:
+            self.known.give(new.known)
+
+    def _show_patient(self, new: Patient, old: Patient | None) -> None:
+        state = self._state
+        self.scan.show_patient(new, state.has_ghost)
+        self.alignment.show_patient(new, state.has_ghost)
+        self.known.show_patient(new)
+        self.compare.show_state(state)
+        if new.fit is not None and state.atlas is not None and (old is None or new.fit is not old.fit):
+            self.result = exchange(self.result, result_part(new.fit, state.atlas.covariates))
+            if old is not None and old.key == new.key:
+                QTimer.singleShot(0, self, self._reveal_result)
+
+    def _reveal_result(self) -> None:
+        """Scroll to what was just found, once it has its place."""
+        self._area.ensureWidgetVisible(self.result, 0, 16)
+
+    def _show_rows(self, covariates: Sequence[Covariate]) -> None:
+        """Made later than what stands below them, so that the Tab key has to be told."""
+        self.known.show_covariates(covariates)
+        for first, second in pairwise([self.alignment.unit, *self.known.stops(), self.compare.box]):
+            QWidget.setTabOrder(first, second)
+        for stop in self.known.stops():
+            stop.installEventFilter(self)
+
+    def _compose(self) -> None:
+        title = QLabel("Patients")
+        title.setObjectName("title")
+        head = QHBoxLayout()
+        head.addWidget(title, 1)
+        head.addWidget(self.open)
+        top = QVBoxLayout()
+        top.setSpacing(10)
+        top.addLayout(head)
+        top.addWidget(self.invitation)
+        top.addWidget(self.list)
+        column = QVBoxLayout(self._inside)
+        column.setContentsMargins(18, 16, 18, 16)
+        column.setSpacing(20)
+        column.addLayout(top)
+        for part in (self.scan, self.alignment, self.known, self.result, self.compare):
+            column.addWidget(part)
+        column.addStretch(1)
+        self._area.setWidget(self._inside)
+        self._area.setWidgetResizable(True)
+        self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        outer = QVBoxLayout(self)
+        outer.setContentsMargins(1, 0, 0, 0)
+        outer.addWidget(self._area)
+
+    def _connect(self) -> None:
+        self.open.clicked.connect(self.open_requested)
+        self.list.patient_chosen.connect(self.patient_chosen)
+        self.list.close_requested.connect(self.close_requested)
+        for reread in (self.scan.reread, self.scan.reread_changed):
+            reread.clicked.connect(self.reread_requested)
+        self.scan.ghost.clicked.connect(self.ghost_toggled)
+        self.alignment.reading_changed.connect(self.reading_changed)
+        self.known.fit.clicked.connect(lambda: self.fit_requested.emit(self.known.given()))
+        self.compare.box.activated.connect(lambda: self.compared_chosen.emit(self.compare.box.currentData()))
+        for box in (self.alignment.method, self.alignment.unit, self.compare.box):
+            box.installEventFilter(self)

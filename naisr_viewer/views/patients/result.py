@@ -1,0 +1,49 @@
+"""Of a patient: what the fit found, and whom it is compared with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QWidget
+
+from naisr_model.covariates import Covariate
+from naisr_viewer.state.explorer import ExplorerState
+from naisr_viewer.state.patients import Fitted
+from naisr_viewer.views.patients.pieces import ChoiceBox, grid_in, paragraph, section, warnings
+from naisr_viewer.words.patients import findings
+
+
+def result_part(fit: Fitted, covariates: Sequence[Covariate]) -> QWidget:
+    """What ``fit`` found, and how sure it is."""
+    part, table = QWidget(), QWidget()
+    column = section(part, "Result")
+    column.addWidget(table)
+    if fit.remarks:
+        column.addWidget(warnings(fit.remarks))
+    grid = grid_in(table, 12, 0, wide=1)
+    top, right = Qt.AlignmentFlag.AlignTop, Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignRight
+    for row, (what, value, sure) in enumerate(findings(fit, covariates)):
+        figure = paragraph(value, "figure", right)
+        figure.setAccessibleName(f"{what}: {value}")
+        grid.addWidget(paragraph(what, "muted", top), 3 * row, 0)
+        grid.addWidget(figure, 3 * row, 1)
+        if sure:
+            grid.addWidget(paragraph(sure, "muted", right), 3 * row + 1, 0, 1, 2)
+        grid.setRowMinimumHeight(3 * row + 2, 6)
+    return part
+
+
+class ComparePart(QWidget):
+    """Which fit the change is counted from."""
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.box = ChoiceBox("Compare with", "What “before” is in View > Before and after", self)
+        section(self, "Compare with").addWidget(self.box)
+
+    def show_state(self, state: ExplorerState) -> None:
+        """Offer the other fitted patients."""
+        others = {each.key: each.name for each in state.patients if each.fit and each.key != state.patient}
+        current = state.compared if state.compared in others else None
+        self.box.show_choices([(None, "this patient as fitted"), *others.items()], current)

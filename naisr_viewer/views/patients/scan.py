@@ -1,0 +1,117 @@
+"""Of a patient: what was measured, and where it lies."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QCheckBox, QFormLayout, QFrame, QHBoxLayout, QVBoxLayout, QWidget
+
+from naisr_viewer.state.patients import Method, Patient, Reading
+from naisr_viewer.views.dialogs import ask_landmarks_path
+from naisr_viewer.views.patients.pieces import ChoiceBox, button, exchange, paragraph, section, warnings
+from naisr_viewer.words.patients import METHODS, breakable, measured, sentence, units
+
+REREAD_TIP = "Read the file from the disk again, for example after it was edited"
+SEE_FIRST = "The scan is drawn over the atlas as it lies; see that it fits before it is fitted."
+
+
+class ScanPart(QWidget):
+    """What was measured, and what is the matter with it."""
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.reread = button("Read again", REREAD_TIP, "small")
+        self.reread_changed = button("Read again", REREAD_TIP)
+        self.changed = QFrame()
+        self.changed.setObjectName("changed")
+        self.source = paragraph()
+        self.volume = paragraph(style="muted")
+        self.blocked = paragraph(style="blocked")
+        self.notes = QWidget()
+        self._notes_shown: tuple[str, ...] = ()
+        self.ghost = QCheckBox("Show the scan over the shape")
+        self.ghost.setToolTip("Draw what was measured, transparent, over the atlas's shape")
+        self._compose()
+
+    def show_patient(self, patient: Patient, has_ghost: bool) -> None:
+        """Show ``patient``'s scan."""
+        scan = patient.scan
+        self.source.setText(breakable(scan.source))
+        self.source.setToolTip(str(patient.reading.path))
+        self.volume.setText(measured(scan))
+        if scan.notes != self._notes_shown:
+            self._notes_shown = scan.notes
+            self.notes = exchange(self.notes, warnings(scan.notes))
+        self.notes.setVisible(bool(scan.notes))
+        self.blocked.setText(sentence(scan.blocked))
+        self.blocked.setVisible(bool(scan.blocked))
+        self.changed.setVisible(patient.is_changed)
+        self.reread.setVisible(not patient.is_changed)
+        self.ghost.setChecked(has_ghost)
+
+    def _compose(self) -> None:
+        notice = QHBoxLayout(self.changed)
+        notice.setContentsMargins(10, 8, 8, 8)
+        notice.addWidget(paragraph("The file has changed on disk"), 1)
+        notice.addWidget(self.reread_changed)
+        facts = QVBoxLayout()
+        facts.setSpacing(2)
+        facts.addWidget(self.source)
+        facts.addWidget(self.volume)
+        column = section(self, "Scan", self.reread)
+        column.addWidget(self.changed)
+        column.addLayout(facts)
+        for widget in (self.blocked, self.notes, self.ghost):
+            column.addWidget(widget)
+
+
+class AlignmentPart(QWidget):
+    """How the file is brought into the frame of the atlas."""
+
+    reading_changed = Signal(object)  # a Reading with another alignment or unit
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        self._reading = Reading(Path())
+        self.method = ChoiceBox("Alignment", "How the scan is moved onto the atlas's shape", self)
+        self.unit = ChoiceBox("Unit of the file", "How long one unit of the file's coordinates is", self)
+        self.sentence = paragraph()
+        self.hint = paragraph(SEE_FIRST, "muted")
+        form = QFormLayout()
+        form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        form.setHorizontalSpacing(12)
+        form.setVerticalSpacing(6)
+        form.addRow("Position", self.method)
+        form.addRow("Unit", self.unit)
+        column = section(self, "Alignment")
+        column.addLayout(form)
+        column.addWidget(self.sentence)
+        column.addWidget(self.hint)
+        self.method.activated.connect(self._method_chosen)
+        self.unit.activated.connect(self._unit_chosen)
+
+    def show_patient(self, patient: Patient, has_ghost: bool) -> None:
+        """Show how ``patient``'s file was read, and that it can be seen where the scan lies."""
+        self._reading = patient.reading
+        self.method.show_choices(METHODS, patient.reading.align)
+        self.unit.show_choices(units(patient.reading.scale), patient.reading.scale)
+        self.sentence.setText(sentence(patient.scan.alignment))
+        self.sentence.setVisible(bool(patient.scan.alignment))
+        self.hint.setVisible(has_ghost and patient.fit is None and not patient.scan.blocked)
+
+    def _method_chosen(self) -> None:
+        align: Method = self.method.currentData()
+        landmarks = ask_landmarks_path(self) if align == "landmarks" else None
+        if align == "landmarks" and landmarks is None:
+            self.method.show_choices(METHODS, self._reading.align)
+        else:
+            self._ask(replace(self._reading, align=align, landmarks=landmarks))
+
+    def _unit_chosen(self) -> None:
+        self._ask(replace(self._reading, scale=self.unit.currentData()))
+
+    def _ask(self, reading: Reading) -> None:
+        if reading != self._reading:
+            self.reading_changed.emit(reading)

@@ -1,0 +1,83 @@
+"""What stands around a shape: its title, its colour bar and its caption."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from PySide6.QtCore import QRect, Qt
+from PySide6.QtWidgets import QLabel, QWidget
+
+from naisr_viewer.state.explorer import AtlasCard, Panel, panel_title
+from naisr_viewer.state.requests import HAS_TWO_SIDES, SurfaceResult
+from naisr_viewer.views.shapes.colour_bar import HEIGHT_PX, WIDTH_PX, ColourBar
+from naisr_viewer.views.theme import panel_colour
+from naisr_viewer.words.captions import PANEL_HINTS
+
+TITLE_PX = 36
+CAPTION_PX = 52
+"""Strips above and beneath each shape, kept free for words."""
+
+
+def strip_height(panels: Sequence[Panel]) -> int:
+    """Pixels beneath every shape for colour bars; none where no panel has one."""
+    return HEIGHT_PX if any(panel.kind in HAS_TWO_SIDES for panel in panels) else 0
+
+
+def drawn_height(area: QRect, strip: int) -> int:
+    """Pixels left for the shape between the title and what stands beneath it."""
+    return max(area.height() - TITLE_PX - CAPTION_PX - strip, 1)
+
+
+@dataclass(eq=False)
+class Cell:
+    """One sub-plot on screen.
+
+    Attributes:
+        title: the label above.
+        volume: the label beneath.
+        bar: what its colours stand for; None where it has none.
+        result: the surface, or None as long as there is none.
+    """
+
+    title: QLabel
+    volume: QLabel
+    bar: ColourBar | None
+    result: SurfaceResult | None = None
+
+    @property
+    def has_surface(self) -> bool:
+        """Whether there is anything to see."""
+        return self.result is not None and len(self.result.points_mm) > 0
+
+    @property
+    def widgets(self) -> list[QWidget]:
+        """All that stands around the shape."""
+        return [self.title, self.volume, *([] if self.bar is None else [self.bar])]
+
+    def place(self, area: QRect, strip: int) -> None:
+        """The title above the shape; beneath it the colour bar, and the caption under that."""
+        self.title.setGeometry(area.left(), area.top(), area.width(), TITLE_PX)
+        height = CAPTION_PX + strip
+        top = area.top() + area.height() - height
+        self.volume.setGeometry(area.left(), top, area.width(), height)
+        self.volume.setContentsMargins(0, strip, 0, 0)
+        if self.bar is not None:
+            width = min(WIDTH_PX, area.width())
+            self.bar.setGeometry(area.left() + (area.width() - width) // 2, top, width, HEIGHT_PX)
+
+
+def make_cell(panel: Panel, atlas: AtlasCard, parent: QWidget) -> Cell:
+    """The labels of a sub-plot, still without a place, and its colour bar where it has one."""
+    colour = panel_colour(atlas, panel)
+    title = QLabel(f'<span style="color:{colour}">●</span>&nbsp;{panel_title(panel)}', parent)
+    title.setObjectName("panelTitle")
+    title.setToolTip(PANEL_HINTS[panel.kind])
+    title.setWhatsThis(PANEL_HINTS[panel.kind])
+    volume = QLabel(parent)
+    volume.setObjectName("volume")
+    volume.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
+    bar = ColourBar(HAS_TWO_SIDES[panel.kind], parent) if panel.kind in HAS_TWO_SIDES else None
+    if bar is not None:
+        bar.setToolTip(PANEL_HINTS[panel.kind])
+    return Cell(title, volume, bar)

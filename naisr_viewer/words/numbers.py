@@ -1,0 +1,72 @@
+"""How values, volumes and errors are put everywhere in the window. Knows no Qt."""
+
+from __future__ import annotations
+
+import math
+
+from naisr_model.errors import InputError
+from naisr_viewer.state.explorer import Covariate
+
+
+def decimals(covariate: Covariate) -> int:
+    """Digits after the point that tell about a thousand steps of the range apart."""
+    low, high = covariate.range
+    return max(0, min(6, 2 - math.floor(math.log10(max(high - low, 1e-6)))))
+
+
+def reading(covariate: Covariate, value: float) -> str:
+    """The value with its unit and as many digits as its number box has: ``84 months``, ``M``."""
+    if covariate.kind == "binary":
+        return covariate.format(round(value, 2))
+    return f"{value:.{decimals(covariate)}f} {covariate.unit}".rstrip()
+
+
+def patient_reading(covariate: Covariate, value: float, interval: tuple[float, float] | None) -> str:
+    """The patient's value in words: ``patient 21.3 kg, 95 %: 18.2 to 24.9``."""
+    text = f"patient {reading(covariate, value)}"
+    if interval is None:
+        return text
+    digits = 2 if covariate.kind == "binary" else decimals(covariate)
+    low, high = (f"{end:.{digits}f}".replace("-", "−") for end in interval)
+    return f"{text}, 95 %: {low} to {high}"
+
+
+def mean_reading(covariate: Covariate) -> str:
+    """The population mean in words; halfway between the levels of a binary covariate."""
+    return "in the middle" if covariate.kind == "binary" else reading(covariate, covariate.centre)
+
+
+def volume(cm3: float, margin_cm3: float | None = None) -> str:
+    """A volume with digits that mean something: ``48.3 cm³``, ``61.2 ± 7.0 cm³``, ``69,100 ± 5,900 cm³``.
+
+    Beside a margin it ends with the margin's second digit.
+    """
+    if not margin_cm3 or not math.isfinite(margin_cm3):
+        return f"{cm3:,.{0 if abs(cm3) >= 1000 else 1}f} cm³"
+    digits = 1 - math.floor(math.log10(margin_cm3))
+    places = max(0, digits)
+    return f"{round(cm3, digits):,.{places}f} ± {round(margin_cm3, digits):,.{places}f} cm³"
+
+
+def gained(cm3: float, before_cm3: float, margin_cm3: float | None = None) -> str:
+    """A difference of volumes: ``+12.7 cm³ (+26 %)``; with no more digits than the later volume has."""
+    difference, digits = cm3 - before_cm3, 0 if before_cm3 >= 1000 else 1
+    if margin_cm3:
+        digits = min(digits, 1 - math.floor(math.log10(margin_cm3)))
+    share = f" ({100 * difference / before_cm3:+.0f} %)" if before_cm3 else ""
+    return f"{round(difference, digits):+,.{max(0, digits)}f} cm³{share}".replace("-", "−")
+
+
+def capitalised(text: str) -> str:
+    """``text`` with a capital letter in front, unless it begins with a name such as ``p01.stl``."""
+    return text[:1].upper() + text[1:] if text.split(" ", 1)[0].isalpha() else text
+
+
+def in_words(error: BaseException) -> str:
+    """An error as the user reads it."""
+    if isinstance(error, InputError):
+        text = capitalised(str(error))
+        return text if text.endswith(".") else f"{text}."
+    return (
+        f"Something unexpected went wrong ({type(error).__name__}: {error}). What is on screen is unchanged."
+    )

@@ -1,0 +1,74 @@
+"""What the right side says of a scan and a fit, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from naisr_model.covariates import Covariate
+from naisr_viewer.state.explorer import label
+from naisr_viewer.state.patients import Fitted, Method, Scan
+from naisr_viewer.words.numbers import capitalised, reading, volume
+
+LONGEST_WORD = 28
+"""Letters that surely fit into a line; longer names are broken anywhere."""
+
+METHODS: tuple[tuple[Method, str], ...] = (
+    ("none", "as in the file"),
+    ("icp", "rigid (ICP)"),
+    ("landmarks", "landmarks…"),
+)
+UNITS: tuple[tuple[float | None, str], ...] = (
+    (None, "guessed"),
+    (1.0, "mm"),
+    (10.0, "cm"),
+    (1000.0, "m"),
+    (25.4, "inch"),
+)
+"""Millimetres per unit of the file, and what the unit is called."""
+
+
+def units(scale: float | None) -> tuple[tuple[float | None, str], ...]:
+    """The units on offer, with ``scale`` among them whatever it is."""
+    return UNITS if scale in dict(UNITS) else (*UNITS, (scale, f"{scale:g} mm"))
+
+
+def measured(scan: Scan) -> str:
+    """The volume of a scan, or why it has none."""
+    if scan.volume_cm3 is not None:
+        return f"encloses {volume(scan.volume_cm3)}"
+    return "open surface, no volume" if len(scan.faces) else "cloud of points, no volume"
+
+
+def interval(covariate: Covariate, low: float, high: float) -> str:
+    """A 95 % interval: ``95 %: 18.2 to 24.9 kg``; of a binary covariate the levels it leaves open."""
+    start, end = reading(covariate, low), reading(covariate, high)
+    if covariate.kind == "binary":
+        return "inferred" if low == high else f"inferred; {start} or {end}"
+    return f"95 %: {start.removesuffix(covariate.unit).strip()} to {end}"
+
+
+def findings(fit: Fitted, covariates: Sequence[Covariate]) -> list[tuple[str, str, str]]:
+    """The rows of the result: what, its value with unit, and how sure or what it means."""
+    values = dict(fit.values)
+    sure = {name: (low, high) for name, low, high in fit.intervals}
+    rows = []
+    for each in covariates:
+        how = interval(each, *sure[each.name]) if each.name in sure else "known"
+        rows.append((label(each.name), reading(each, values[each.name]), how))
+    return [
+        *rows,
+        ("Volume", f"{volume(fit.volume_cm3, fit.volume_margin_cm3)} (95 %)", ""),
+        ("Residual", f"{fit.residual_mm:.2f} mm", "mean distance, scan to fitted surface"),
+        ("Lasting", f"{100 * fit.lasting:.0f} %", "of what sets the patient apart"),
+        ("Time", f"{fit.seconds:.1f} s", ""),
+    ]
+
+
+def sentence(text: str) -> str:
+    """``text`` as it stands in the panel, with a capital letter in front."""
+    return breakable(capitalised(text))
+
+
+def breakable(text: str) -> str:
+    """``text`` with words that can be broken anywhere, where they would not fit into a line."""
+    return " ".join("\u200b".join(word) if len(word) > LONGEST_WORD else word for word in text.split(" "))

@@ -1,0 +1,178 @@
+"""Training on shapes whose covariate effects are known."""
+
+import dataclasses
+import itertools
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from eggs import egg, egg_preset
+
+from naisr_model.atlas import Atlas
+from naisr_model.checkpoint import load
+from naisr_model.config import PRESETS, FitConfig, LossWeights
+from naisr_model.errors import Cancelled, InputError
+from naisr_model.learning.fitting.search import fit_latents
+from naisr_model.learning.training import loop as training
+from naisr_model.learning.training.loop import train
+from naisr_model.learning.training.objective import Batch
+
+
+def test_the_effects_are_those_of_the_population(egg_atlas):
+    atlas = Atlas.load(egg_atlas)
+    for age in (2.0, 5.0, 8.0):
+        for sex in (-1.0, 1.0):
+            shape, truth = atlas.shape({"age": age, "sex": sex}, resolution=64), egg(age, sex)
+            assert shape.is_watertight
+            assert shape.volume == pytest.approx(truth.volume, rel=0.1)
+            assert shape.extents == pytest.approx(truth.extents, rel=0.1)
+    older = atlas.effect("age", 8.0, resolution=64).extents / atlas.effect("age", 2.0, resolution=64).extents
+    assert older[2] > 1.2
+    assert older[:2] == pytest.approx(1, abs=0.08)
+    assert atlas.template(64).volume == pytest.approx(
+        egg(atlas.population.centre["age"], 0.0).volume, rel=0.1
+    )
+
+
+def test_the_checkpoint_tells_how_it_was_trained(egg_atlas):
+    record = load(egg_atlas).training
+    assert record["iterations"] == 600
+    assert record["folded_share"] < 0.01
+    templates = sorted((egg_atlas.parent / (egg_atlas.name + ".training") / "templates").iterdir())
+    assert [path.name for path in templates][-1] == "epoch_00100.ply"
+
+
+def same(first, second):
+    return all(torch.equal(first.weights[name], tensor) for name, tensor in second.weights.items()) and (
+        np.array_equal(first.latents, second.latents)
+    )
+
+
+KILLED = """
+import os, signal, sys, torch
+from pathlib import Path
+from eggs import egg_preset
+from naisr_model.data.store import SampleStore
+from naisr_model.learning.training import loop as training
+
+torch.set_num_threads(1)
+training.SAVE_SECONDS = 0.0
+def report(told):
+    if told.iteration == 7:
+        os.kill(os.getpid(), signal.SIGKILL)
+training.train(SampleStore.open(sys.argv[1]), egg_preset(epochs=6), Path(sys.argv[2]), report=report)
+"""
+
+
+def test_a_killed_training_ends_like_one_that_was_not(egg_store, tmp_path):
+    preset = egg_preset(epochs=6)
+    whole = train(egg_store, preset, tmp_path / "whole.safetensors")
+    out = tmp_path / "killed.safetensors"
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[3])}
+    command = [sys.executable, "-c", KILLED, str(egg_store.path), str(out)]
+    assert subprocess.run(command, env=environment, check=False).returncode == -signal.SIGKILL
+    assert load(out).training["iterations"] in (6, 7)
+    assert same(train(egg_store, preset, out), whole)
+
+
+def test_a_stopped_training_keeps_what_it_reached(egg_store, tmp_path):
+    out, preset = tmp_path / "stopped.safetensors", egg_preset(epochs=6)
+    seen: list[training.Report] = []
+    with pytest.raises(Cancelled):
+        train(egg_store, preset, out, report=seen.append, should_stop=lambda: len(seen) == 5)
+    assert load(out).training["iterations"] == 5
+    assert train(egg_store, preset, out, report=seen.append).training["iterations"] == 12
+    assert [told.iteration for told in seen] == list(range(1, 13))
+
+
+def test_other_settings_do_not_continue_a_training(egg_store, tmp_path):
+    out = tmp_path / "a.safetensors"
+    train(egg_store, egg_preset(epochs=1), out)
+    with pytest.raises(InputError, match="other settings"):
+        train(egg_store, egg_preset(epochs=2), out)
+
+
+def test_other_data_do_not_continue_a_training(egg_store, tmp_path):
+    out, preset = tmp_path / "a.safetensors", egg_preset(epochs=1)
+    train(egg_store, preset, out)
+    population = dataclasses.replace(egg_store.population, values=egg_store.population.values[::-1].copy())
+    with pytest.raises(InputError, match="other settings or data"):
+        train(dataclasses.replace(egg_store, population=population), preset, out)
+
+
+def test_settings_that_do_not_fit_are_refused(egg_store, tmp_path):
+    flat = dataclasses.replace(egg_preset(1), network=PRESETS["paper-starman"].network)
+    with pytest.raises(InputError, match="2D shapes and the store holds 3D"):
+        train(egg_store, flat, tmp_path / "a.safetensors")
+    with pytest.raises(InputError, match="cannot compute on 'abacus'"):
+        train(egg_store, egg_preset(1), tmp_path / "a.safetensors", device="abacus")
+
+
+def diverging(preset):
+    return dataclasses.replace(preset, training=dataclasses.replace(preset.training, template_rate=30.0))
+
+
+def test_divergence_stops_with_advice_and_keeps_the_last_good_state(egg_store, tmp_path, monkeypatch):
+    monkeypatch.setattr(training, "SAVE_SECONDS", 0.0)
+    losses: list[float] = []
+    out = tmp_path / "wild.safetensors"
+    with pytest.raises(InputError, match=r"broke down.*last good state is in .*template_rate below 30"):
+        train(
+            egg_store,
+            diverging(egg_preset(epochs=50)),
+            out,
+            report=lambda r: losses.append(r.losses["total"]),
+        )
+    kept = load(out)
+    assert kept.training["iterations"] == 0  # the first step already leaves every good state
+    assert all((tensor.abs() < 10).all() for tensor in kept.weights.values())
+
+
+def test_nan_stops_a_training_at_once(egg_store, tmp_path, monkeypatch):
+    nothing = lambda *_, **__: {"broken": torch.tensor(float("nan"), requires_grad=True)}  # noqa: E731
+    monkeypatch.setattr(training, "latent_term", nothing)
+    with pytest.raises(InputError, match=r"iteration 0 \(loss nan\); no good state"):
+        train(egg_store, egg_preset(epochs=1), tmp_path / "nan.safetensors")
+
+
+def test_a_time_budget_bounds_the_training_over_all_its_runs(egg_store, tmp_path, monkeypatch):
+    clock = itertools.count(step=0.01)
+    monkeypatch.setattr(training.time, "monotonic", lambda: next(clock))
+    out, preset = tmp_path / "b.safetensors", egg_preset(epochs=100_000)
+    seen: list[training.Report] = []
+    with pytest.raises(Cancelled):
+        train(
+            egg_store, preset, out, time_budget_s=1.0, report=seen.append, should_stop=lambda: len(seen) > 9
+        )
+    checkpoint = train(egg_store, preset, out, time_budget_s=1.0, report=seen.append)
+    assert checkpoint.training["seconds"] == pytest.approx(1.0, abs=0.05)
+    assert seen[-1].share >= 1 and 20 < len(seen) < 110
+    assert [told.iteration for told in seen] == list(range(1, len(seen) + 1))
+
+
+def test_fitting_recovers_the_code_of_a_shape_the_atlas_can_make(egg_atlas):
+    checkpoint = load(egg_atlas)
+    network = checkpoint.network()
+    latent = torch.as_tensor(checkpoint.latents[:1])
+    covariates = torch.tensor([[1.0, 1.0]])
+    generator = np.random.default_rng(0)
+    points = torch.as_tensor(generator.uniform(-1, 1, (1, 400, 3)), dtype=torch.float32)
+    with torch.inference_mode():
+        target = network(points, covariates, latent)[0]
+    batch = Batch(points[:, :1], torch.ones(1, 1, 3), points.clone(), target.clone())
+    only_distances = LossWeights(
+        surface_eikonal=0.0, surface_distance=0.0, surface_normal=0.0, space_eikonal=0.0, latent=1e-4
+    )
+    config = FitConfig(steps=300, rate=2e-2)
+    found = fit_latents(network, lambda rng: batch, covariates, config, only_distances)
+    with torch.inference_mode():
+        missed = (network(points, covariates, found)[0] - target).abs().mean()
+        without = (network(points, covariates, torch.zeros_like(found))[0] - target).abs().mean()
+    assert missed < 0.2 * without + 1e-5
+    with pytest.raises(Cancelled):
+        fit_latents(network, lambda rng: batch, covariates, config, only_distances, should_stop=lambda: True)

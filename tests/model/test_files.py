@@ -1,0 +1,55 @@
+"""Files that are replaced whole, whatever happens meanwhile."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from naisr_model.files import replacing
+
+
+def test_the_content_is_on_the_disk_before_it_takes_its_place(tmp_path, monkeypatch):
+    path, steps = tmp_path / "kept.txt", []
+    replace, sync = os.replace, os.fsync
+
+    def synced(descriptor: int) -> None:
+        steps.append(("synced", os.fstat(descriptor).st_ino))
+        sync(descriptor)
+
+    def replaced(old: Path, new: Path) -> None:
+        steps.append(("replaced", old.stat().st_ino))
+        replace(old, new)
+
+    monkeypatch.setattr(os, "fsync", synced)
+    monkeypatch.setattr(os, "replace", replaced)
+    with replacing(path) as temporary:
+        temporary.write_text("new")
+    number = path.stat().st_ino
+    assert steps == [("synced", number), ("replaced", number)]
+
+
+def test_writing_leaves_the_mask_of_the_process_alone(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "umask", lambda mask: pytest.fail("other threads would write with this mask"))
+    with replacing(tmp_path / "kept.txt") as temporary:
+        temporary.write_text("new")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there are no such permissions")
+def test_a_file_gets_the_permissions_of_any_other(tmp_path):
+    program = (
+        "import os, pathlib, sys; os.umask(0o027)\n"
+        "from naisr_model.files import replacing\n"
+        "with replacing(pathlib.Path(sys.argv[1])) as temporary:\n"
+        "    os.close(os.open(temporary, os.O_CREAT, 0o600))\n"
+        "pathlib.Path(sys.argv[2]).touch()\n"
+    )
+    saved, plain = tmp_path / "saved.txt", tmp_path / "plain.txt"
+    subprocess.run(
+        [sys.executable, "-c", program, str(saved), str(plain)], check=True, cwd=Path(__file__).parents[2]
+    )
+    assert saved.stat().st_mode == plain.stat().st_mode
+    assert plain.stat().st_mode & 0o777 == 0o640

@@ -1,0 +1,399 @@
+"""Patients in the whole window: files on disk, mouse and keyboard, an atlas that was really trained."""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from eggs import egg
+from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
+from PySide6.QtGui import QAction, QDropEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QFileDialog, QWidget
+
+from naisr_viewer.app import make_window
+from naisr_viewer.engine.engine import Engine
+from naisr_viewer.state.explorer import BEFORE, CERTAINTY, CHANGE, FULL_SHAPE, SCAN, TEMPLATE, Layout
+from naisr_viewer.state.requests import ExportChoice
+from naisr_viewer.views import main_window
+from naisr_viewer.words.numbers import gained, volume
+
+CUBIC_CM = egg(6.0, 1.0).volume / 1000
+
+
+@pytest.fixture(scope="module")
+def engine(egg_atlas, tmp_path_factory) -> Engine:
+    return Engine(folder=tmp_path_factory.mktemp("kept"))
+
+
+@pytest.fixture
+def ready(qtbot, engine, egg_atlas, tmp_path):
+    """A window on the atlas of the eggs."""
+    window, controller = make_window(engine, tmp_path / "settings.ini")
+    window.resize(1280, 800)
+    window.show()
+    qtbot.waitExposed(window)
+    controller.open(egg_atlas)
+    settle(qtbot, controller)
+    yield window, controller
+    window.close()
+    window.deleteLater()
+    qtbot.wait(0)
+    gc.collect()
+
+
+def settle(qtbot, controller) -> None:
+    qtbot.waitUntil(lambda: not controller.is_busy, timeout=60_000)
+
+
+@pytest.fixture
+def scan_file(tmp_path) -> Path:
+    path = tmp_path / "p01.stl"
+    egg(6.0, 1.0).export(path)
+    return path
+
+
+def drop(window: QWidget, path: Path) -> None:
+    mime = QMimeData()
+    mime.setUrls([QUrl.fromLocalFile(str(path))])
+    event = QDropEvent(
+        QPointF(400, 300),
+        Qt.DropAction.CopyAction,
+        mime,
+        Qt.MouseButton.LeftButton,
+        Qt.KeyboardModifier.NoModifier,
+    )
+    window.dropEvent(event)
+
+
+def click(button) -> None:
+    QTest.mouseClick(button, Qt.MouseButton.LeftButton)
+
+
+def type_known(window, name: str, text: str) -> None:
+    """A number typed into the field of a covariate."""
+    field = window.patients.known.rows[name].field
+    field.setFocus()
+    field.selectAll()
+    QTest.keyClicks(field, text)
+    QTest.keyClick(field, Qt.Key.Key_Return)
+
+
+def action(window, text: str) -> QAction:
+    (found,) = [each for each in window.findChildren(QAction) if each.text() == text]
+    return found
+
+
+@pytest.fixture
+def fitted(ready, qtbot, scan_file):
+    window, controller = ready
+    drop(window, scan_file)
+    settle(qtbot, controller)
+    type_known(window, "age", "6")
+    click(window.patients.known.rows["sex"].field.buttons[1])
+    click(window.patients.known.fit)
+    assert controller.is_busy
+    settle(qtbot, controller)
+    assert not window.error_text.text()
+    return window, controller
+
+
+def test_a_dropped_scan_is_shown_and_waits_to_be_fitted(ready, qtbot, scan_file):
+    window, controller = ready
+    assert not window.patients.isVisible() and not action(window, "Fit").isEnabled()
+    drop(window, scan_file)
+    settle(qtbot, controller)
+    state = controller.state
+    assert window.patients.isVisible() and state.shown.name == "p01.stl"
+    assert state.shown.scan.volume_cm3 == pytest.approx(CUBIC_CM, rel=1e-6)
+    assert state.fit is None and state.person == 0 and window.patients.known.fit.isEnabled()
+
+
+def test_the_file_menu_opens_a_scan(ready, qtbot, scan_file, monkeypatch):
+    window, controller = ready
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *args, **more: (str(scan_file), ""))
+    action(window, "Open scan…").trigger()
+    settle(qtbot, controller)
+    assert [each.name for each in controller.state.patients] == ["p01.stl"]
+
+
+def test_a_fit_ends_at_the_patient_with_an_interval(fitted):
+    window, controller = fitted
+    state = controller.state
+    assert dict(state.fit.values) == {"age": 6.0, "sex": 1.0}
+    assert state.layout is Layout.FIT and action(window, "Fit").isChecked()
+    assert state.fit.volume_cm3 == pytest.approx(CUBIC_CM, rel=0.03)
+    assert state.fit.residual_mm < 0.5
+    assert volume(state.fit.volume_cm3, state.fit.volume_margin_cm3) in window.shapes.caption(FULL_SHAPE)
+    assert controller.shown[SCAN].colouring is not None
+    assert controller.shown[CERTAINTY].colouring is not None
+    assert "mean distance" in window.shapes.caption(SCAN)
+
+
+def test_what_was_not_given_is_inferred(ready, qtbot, scan_file):
+    window, controller = ready
+    drop(window, scan_file)
+    settle(qtbot, controller)
+    click(window.patients.known.fit)
+    settle(qtbot, controller)
+    ((age, low, high), _sex) = controller.state.fit.intervals
+    assert age == "age" and low < 6 < high
+
+
+def test_years_ahead_before_and_after(fitted, qtbot):
+    window, controller = fitted
+    action(window, "Before and after").trigger()
+    settle(qtbot, controller)
+    spin = window.covariates.rows["age"].spin
+    spin.setFocus()
+    spin.selectAll()
+    QTest.keyClicks(spin, "8.5")
+    QTest.keyClick(spin, Qt.Key.Key_Return)
+    qtbot.waitUntil(lambda: not controller.is_moving and not controller.is_busy, timeout=60_000)
+    assert set(controller.shown) >= {BEFORE, FULL_SHAPE, CHANGE}
+    before, after, change = (controller.shown[panel] for panel in (BEFORE, FULL_SHAPE, CHANGE))
+    gain = (egg(8.5, 1.0).volume - egg(6.0, 1.0).volume) / 1000
+    assert after.volume_cm3 - before.volume_cm3 == pytest.approx(gain, rel=0.2)
+    assert change.colouring.values_mm.max() == pytest.approx(5, abs=1.2)  # 2 mm a year at the poles
+    assert gained(change.volume_cm3, change.volume_before_cm3, change.volume_margin_cm3) in (
+        window.shapes.caption(CHANGE)
+    )
+    click(window.covariates.reset_all)
+    settle(qtbot, controller)
+    assert dict(controller.state.named)["age"] == 6.0
+
+
+def test_dragging_follows_with_the_patients_own_code(fitted, qtbot, engine, egg_atlas):
+    _, controller = fitted
+    person = controller.state.person
+    qtbot.waitUntil(lambda: engine.has_previews(egg_atlas, person), timeout=60_000)
+    controller.set_layout(Layout.CHANGE)
+    settle(qtbot, controller)
+    controller.move("age", 7.5)
+    settle(qtbot, controller)
+    change = controller.shown[CHANGE]
+    assert not change.is_exact and change.request.person == person
+    assert change.colouring.values_mm.max() == pytest.approx(3, abs=1)
+    controller.settle("age", 7.5)
+    settle(qtbot, controller)
+    assert controller.shown[CHANGE].is_exact
+
+
+def test_a_patient_is_never_taken_for_the_population(fitted, qtbot):
+    window, controller = fitted
+    mine = controller.shown[FULL_SHAPE].points_mm
+    window.patients.patient_chosen.emit(None)
+    settle(qtbot, controller)
+    assert controller.state.layout is Layout.SIDE_BY_SIDE and controller.state.person == 0
+    assert "±" not in window.shapes.caption(FULL_SHAPE)
+    window.patients.patient_chosen.emit(controller.state.patients[0].key)
+    settle(qtbot, controller)
+    assert controller.shown[FULL_SHAPE].request.person > 0
+    np.testing.assert_array_equal(controller.shown[FULL_SHAPE].points_mm, mine)
+
+
+def test_a_simulated_surgery(fitted, qtbot, scan_file):
+    """Another program lengthens the shape in place; both versions stay open and are compared."""
+    window, controller = fitted
+    longer = egg(8.5, 1.0)
+    other = scan_file.with_suffix(".new.stl")
+    longer.export(other)
+    os.replace(other, scan_file)
+    qtbot.waitUntil(lambda: controller.state.shown.is_changed, timeout=10_000)
+    window.patients.reread_requested.emit()
+    settle(qtbot, controller)
+    old, new = controller.state.patients
+    assert (old.name, new.name) == ("p01.stl", "p01.stl (2)") and old.fit is not None
+    assert dict(window.patients.known.given()) == {"age": 6.0, "sex": 1.0}
+    assert new.scan.volume_cm3 == pytest.approx(longer.volume / 1000, rel=1e-6) and not new.is_changed
+    check = window.patients.known.rows["age"].check
+    QTest.mouseClick(check, Qt.MouseButton.LeftButton, pos=QPoint(8, check.height() // 2))
+    assert dict(window.patients.known.given()) == {"sex": 1.0}  # nobody of a known age can be lengthened
+    click(window.patients.known.fit)
+    settle(qtbot, controller)
+    window.patients.compared_chosen.emit(old.key)
+    controller.set_layout(Layout.CHANGE)
+    settle(qtbot, controller)
+    change = controller.shown[CHANGE]
+    assert change.volume_before_cm3 == pytest.approx(old.fit.volume_cm3)
+    gain = longer.volume / 1000 - CUBIC_CM
+    assert change.volume_cm3 - change.volume_before_cm3 == pytest.approx(gain, rel=0.25)
+
+
+def test_a_stopped_fit_changes_nothing(ready, qtbot, scan_file):
+    window, controller = ready
+    drop(window, scan_file)
+    settle(qtbot, controller)
+    click(window.patients.known.fit)
+    controller.cancel()
+    settle(qtbot, controller)
+    assert controller.state.fit is None and "Cancelled" in window.status.text()
+    assert window.patients.known.fit.isEnabled() and not window.error_text.text()
+
+
+def test_a_file_that_cannot_be_read_loses_nothing(fitted, qtbot, tmp_path):
+    window, controller = fitted
+    before = controller.state
+    bad = tmp_path / "notes.docx"
+    bad.write_text("not a shape")
+    drop(window, bad)
+    settle(qtbot, controller)
+    assert "notes.docx" in window.error_text.text() and controller.state == before
+
+
+def test_a_scan_far_away_is_shown_blocked_until_it_is_aligned(ready, qtbot, tmp_path):
+    window, controller = ready
+    path = tmp_path / "far.stl"
+    mesh = egg(6.0, 1.0)
+    mesh.apply_translation([300, 0, 0])
+    mesh.export(path)
+    drop(window, path)
+    settle(qtbot, controller)
+    assert not window.patients.known.fit.isEnabled()
+    type_known(window, "age", "6")
+    box = window.patients.alignment.method
+    box.setFocus()
+    QTest.keyClick(box, Qt.Key.Key_Down)  # rigid
+    settle(qtbot, controller)
+    scan = controller.state.shown.scan
+    assert "icp" in scan.alignment and window.patients.known.fit.isEnabled()
+    assert np.abs(scan.points_mm.mean(axis=0)).max() < 5
+    assert dict(window.patients.known.given()) == {"age": 6.0}  # what was typed stays
+
+
+def test_a_label_is_chosen(ready, qtbot, tmp_path, monkeypatch):
+    window, controller = ready
+    index = np.stack(np.meshgrid(*[np.arange(48)] * 3, indexing="ij"), axis=-1) - 24
+    voxels = np.zeros((48, 48, 48), np.uint8)
+    voxels[np.linalg.norm(index / [18, 17, 22], axis=-1) < 1] = 2
+    voxels[:3] = 1
+    header = (
+        "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 48 48 48\nspace: left-posterior-superior\n"
+        "space directions: (1,0,0) (0,1,0) (0,0,1)\nspace origin: (-24,-24,-24)\n"
+        "encoding: raw\n\n"
+    )
+    path = tmp_path / "two.nrrd"
+    path.write_bytes(header.encode() + voxels.tobytes(order="F"))
+    asked = []
+
+    def choose(_parent, labels):
+        asked.append([number for number, _ in labels.titles])
+        return 2
+
+    monkeypatch.setattr(main_window, "ask_label", choose)
+    drop(window, path)
+    settle(qtbot, controller)
+    assert asked == [[1, 2]]
+    truth = 4 / 3 * np.pi * 18 * 17 * 22 / 1000
+    assert controller.state.shown.scan.volume_cm3 == pytest.approx(truth, rel=0.05)
+
+
+def test_closing_a_patient_forgets_the_code(fitted, qtbot, engine):
+    window, controller = fitted
+    person = controller.state.person
+    window.patients.close_requested.emit(controller.state.patients[0].key)
+    settle(qtbot, controller)
+    assert controller.state.patients == () and controller.state.person == 0
+    assert person not in engine._members
+
+
+def test_an_export_says_whose_shape_it_is(fitted, qtbot, tmp_path):
+    _, controller = fitted
+    controller.export(ExportChoice((FULL_SHAPE,), "stl", 64, tmp_path / "out"))
+    settle(qtbot, controller)
+    record = json.loads((tmp_path / "out" / "eggs-p01-full-shape.json").read_text())
+    assert record["patient"]["known"] == {"age": 6.0, "sex": 1.0}
+    mesh = trimesh.load_mesh(tmp_path / "out" / "eggs-p01-full-shape.stl")
+    assert mesh.volume / 1000 == pytest.approx(CUBIC_CM, rel=0.05)
+
+
+def test_a_value_the_atlas_never_saw_is_not_turned_into_another(ready, qtbot, scan_file):
+    window, controller = ready
+    drop(window, scan_file)
+    settle(qtbot, controller)
+    for typed in ("12", "0.2"):
+        type_known(window, "age", typed)
+        click(window.patients.known.fit)
+        settle(qtbot, controller)
+        assert f"Age is {typed} years" in window.error_text.text() and controller.state.fit is None
+    type_known(window, "age", "9")  # the oldest there is
+    click(window.patients.known.fit)
+    settle(qtbot, controller)
+    assert dict(controller.state.fit.values)["age"] == pytest.approx(9)
+
+
+def test_a_movement_ends_with_its_patient(fitted, qtbot):
+    window, controller = fitted
+    spin = window.covariates.rows["age"].spin
+    spin.setFocus()
+    spin.selectAll()
+    QTest.keyClicks(spin, "8")
+    QTest.keyClick(spin, Qt.Key.Key_Return)
+    window.patients.patient_chosen.emit(None)  # before the movement counts as at rest
+    qtbot.wait(600)
+    settle(qtbot, controller)
+    assert controller.state.values == controller.state.home and not controller.is_moving
+    assert not action(window, "Undo").isEnabled()
+
+
+def test_nothing_of_one_patient_stands_under_another(fitted, qtbot):
+    window, controller = fitted
+    controller.set_layout(Layout.SIDE_BY_SIDE)
+    settle(qtbot, controller)
+    window.patients.patient_chosen.emit(None)
+    assert {result.request.person for result in controller.shown.values()} <= {0}
+    assert "±" not in window.shapes.caption(FULL_SHAPE)
+    settle(qtbot, controller)
+
+
+def test_several_scans_that_are_dropped_are_all_read(ready, qtbot, tmp_path):
+    window, controller = ready
+    for number, age in enumerate((3.0, 5.0, 7.0)):
+        egg(age, 1.0).export(tmp_path / f"v{number}.ply")
+        drop(window, tmp_path / f"v{number}.ply")
+    qtbot.waitUntil(lambda: len(controller.state.patients) == 3, timeout=60_000)
+    settle(qtbot, controller)
+    assert [each.name for each in controller.state.patients] == ["v0.ply", "v1.ply", "v2.ply"]
+
+
+def test_what_would_end_a_fit_rests_meanwhile(ready, qtbot, scan_file):
+    window, controller = ready
+    drop(window, scan_file)
+    settle(qtbot, controller)
+    click(window.patients.known.fit)
+    for text in ("Open scan…", "Export…", "Reset all covariates", "Undo"):
+        assert not action(window, text).isEnabled()
+    settle(qtbot, controller)
+    assert action(window, "Open scan…").isEnabled() and controller.state.fit is not None
+
+
+def test_a_file_that_is_deleted_and_written_anew_has_changed(ready, qtbot, scan_file):
+    window, controller = ready
+    drop(window, scan_file)
+    settle(qtbot, controller)
+    scan_file.unlink()
+    qtbot.wait(200)
+    assert not controller.state.shown.is_changed
+    egg(7.0, 1.0).export(scan_file)
+    qtbot.waitUntil(lambda: controller.state.shown.is_changed, timeout=10_000)
+
+
+def test_exports_of_two_versions_of_a_file_do_not_meet(fitted, qtbot, tmp_path):
+    window, controller = fitted
+    window.patients.reread_requested.emit()
+    settle(qtbot, controller)
+    click(window.patients.known.fit)
+    settle(qtbot, controller)
+    for patient in controller.state.patients:
+        window.patients.patient_chosen.emit(patient.key)
+        settle(qtbot, controller)
+        controller.export(ExportChoice((TEMPLATE, FULL_SHAPE), "stl", 64, tmp_path / "out"))
+        settle(qtbot, controller)
+    names = {path.name for path in (tmp_path / "out").glob("*.stl")}
+    assert names == {"eggs-p01-full-shape.stl", "eggs-p01-2-full-shape.stl", "eggs-template.stl"}
+    assert json.loads((tmp_path / "out" / "eggs-template.json").read_text())["patient"] is None

@@ -1,0 +1,218 @@
+"""A patient's way through the engine, with an atlas that was really trained."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from eggs import egg
+
+from naisr_model.atlas import Atlas
+from naisr_model.data.samples import signed_distance
+from naisr_model.errors import Cancelled, InputError
+from naisr_model.learning.fitting import prior
+from naisr_viewer.engine.clinic import SHOWN_POINTS, Clinic
+from naisr_viewer.engine.engine import Engine
+from naisr_viewer.engine.members import rounded
+from naisr_viewer.state.explorer import (
+    BEFORE,
+    CERTAINTY,
+    CHANGE,
+    FULL_SHAPE,
+    SCAN,
+    ExplorerState,
+    opened,
+    with_patient,
+    with_value,
+)
+from naisr_viewer.state.patients import Patient, Reading
+from naisr_viewer.state.requests import request_for
+
+KNOWN = (("age", 6.0), ("sex", 1.0))
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("scans") / "s25.stl"
+    egg(6.0, 1.0).export(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def desk(egg_atlas: Path, file: Path, tmp_path_factory: pytest.TempPathFactory):
+    """Engine, clinic, and the state after a fit."""
+    engine = Engine(folder=tmp_path_factory.mktemp("cache"))
+    clinic = Clinic(engine)
+    state = opened(ExplorerState(), engine.open(egg_atlas))
+    reading = Reading(file)
+    scan = clinic.read(egg_atlas, reading, KNOWN)
+    told: list[float] = []
+    fit = clinic.fit(egg_atlas, scan, KNOWN, told.append)
+    assert told == sorted(told) and told[-1] == pytest.approx(1)
+    return engine, clinic, with_patient(state, Patient(1, file.name, reading, scan, KNOWN, fit))
+
+
+def test_a_scan_is_read_as_it_is(desk):
+    scan = desk[2].shown.scan
+    assert scan.source.startswith("s25.stl") and not scan.blocked
+    assert scan.volume_cm3 == pytest.approx(egg(6.0, 1.0).volume / 1000, rel=1e-6)
+    assert scan.normals.shape == scan.points_mm.shape
+
+
+def test_the_fit_is_that_of_python(desk, egg_atlas, file):
+    fit, expected = desk[2].fit, Atlas.load(egg_atlas).fit(trimesh.load_mesh(file), dict(KNOWN))
+    assert dict(fit.values) == pytest.approx(expected.covariates) and fit.intervals == ()
+    assert fit.residual_mm == pytest.approx(expected.residual_mm, rel=0.1)
+    low, high = expected.volume_interval_cm3
+    assert fit.volume_cm3 == pytest.approx(expected.volume_cm3, rel=1e-3)
+    assert fit.volume_margin_cm3 == pytest.approx((high - low) / 2, rel=0.05)
+
+
+def test_elsewhere_only_what_lasts_of_a_patient_is_shown(egg_atlas, tmp_path, monkeypatch):
+    monkeypatch.setattr(prior, "UNSEEN_LASTING", 0.3)
+    atlas, file = Atlas.load(egg_atlas), tmp_path / "outstanding.stl"
+    atlas.shape(dict(KNOWN), 8 * atlas.checkpoint.latents[0], 64).export(file)
+    engine = Engine(folder=tmp_path / "cache")
+    clinic, state = Clinic(engine), opened(ExplorerState(), engine.open(egg_atlas))
+    reading = Reading(file)
+    scan = clinic.read(egg_atlas, reading, KNOWN)
+    fit = clinic.fit(egg_atlas, scan, KNOWN, lambda _: None)
+    state = with_patient(state, Patient(1, file.name, reading, scan, KNOWN, fit))
+    elsewhere = with_value(state, "age", 3.0)
+    assert fit.lasting == 0.3
+    person = atlas.fit(trimesh.load_mesh(file), dict(KNOWN)).at({"age": 3.0})
+    values = dict(elsewhere.named)
+    kept, whole = (atlas.shape(values, share * person.latent).volume / 1000 for share in (1, 1 / 0.3))
+    shown = engine.surface(request_for(elsewhere, FULL_SHAPE, 128))
+    assert shown.volume_cm3 == pytest.approx(kept, rel=2e-3) and abs(whole / kept - 1) > 5e-3
+    low, high = person.volume_interval_cm3
+    assert shown.volume_margin_cm3 == pytest.approx((high - low) / 2, rel=0.05)
+    colouring = engine.surface(request_for(elsewhere, SCAN, 128)).colouring
+    assert colouring is not None
+    off_mm, whole_off_mm = (
+        np.abs(colouring.values_mm - atlas.sdf(scan.points_mm, values, share * person.latent)).mean()
+        for share in (1, 1 / 0.3)
+    )
+    assert off_mm < 0.1 * whole_off_mm
+
+
+def test_the_scan_carries_its_distance_to_the_shape(desk):
+    engine, _, state = desk
+    shape = engine.surface(request_for(state, FULL_SHAPE, 128))
+    scan = engine.surface(request_for(state, SCAN, 128))
+    mesh = trimesh.Trimesh(shape.points_mm, shape.faces, process=False)
+    outside_mm = signed_distance(mesh, scan.points_mm.astype(np.float64))
+    assert scan.colouring.is_signed
+    np.testing.assert_allclose(scan.colouring.values_mm, outside_mm, atol=0.1)
+    assert engine.surface(request_for(state, SCAN, 40)).colouring is None  # on the way there is no time
+
+
+def test_a_younger_shape_leaves_the_scan_outside(desk):
+    engine, _, state = desk
+    scan = engine.surface(request_for(with_value(state, "age", 3.0), SCAN, 128))
+    poles = np.abs(scan.points_mm[:, 2] - scan.points_mm[:, 2].mean()) > 28
+    assert scan.colouring.values_mm[poles].mean() > 2
+
+
+def test_uncertainty_is_positive_and_grows_with_what_is_not_known(desk, egg_atlas):
+    engine, clinic, state = desk
+    told = engine.surface(request_for(state, CERTAINTY, 128))
+    assert not told.colouring.is_signed and (told.colouring.values_mm > 0).all()
+    fit = clinic.fit(egg_atlas, state.shown.scan, (), lambda share: None)
+    assert {name for name, _, _ in fit.intervals} == {"age", "sex"}
+    untold = with_patient(state, replace(state.shown, known=(), fit=fit))
+    unsure = engine.surface(request_for(untold, CERTAINTY, 128))
+    assert np.mean(unsure.colouring.values_mm) > 0.5 * np.mean(told.colouring.values_mm)
+    clinic.forget(fit)
+    with pytest.raises(Cancelled):
+        engine.surface(request_for(untold, CERTAINTY, 128))
+
+
+def test_a_change_is_counted_along_the_normals_from_point_to_point(desk):
+    """Eggs grow 2 mm a year at each pole and not at the equator."""
+    engine, _, state = desk
+    still = engine.surface(request_for(state, CHANGE, 128))
+    np.testing.assert_allclose(still.colouring.values_mm, 0, atol=0.1)
+    older = with_value(state, "age", 8.0)
+    before = engine.surface(request_for(older, BEFORE, 128))
+    after = engine.surface(request_for(older, FULL_SHAPE, 128))
+    for resolution in (40, 128):
+        change = engine.surface(request_for(older, CHANGE, resolution))
+        up = np.abs(change.normals[:, 2])
+        assert change.colouring.values_mm[up > 0.98].mean() == pytest.approx(4, abs=1)
+        assert np.abs(change.colouring.values_mm[up < 0.1]).mean() < 0.5
+        gained = change.volume_cm3 - change.volume_before_cm3
+        assert gained == pytest.approx(after.volume_cm3 - before.volume_cm3, rel=0.05)
+    assert after.volume_margin_cm3 > 0
+
+
+def test_two_patients_can_be_compared(desk, egg_atlas, tmp_path):
+    engine, clinic, state = desk
+    other = tmp_path / "s26.stl"
+    egg(3.0, 1.0).export(other)
+    reading = Reading(other)
+    scan = clinic.read(egg_atlas, reading, ())
+    fit = clinic.fit(egg_atlas, scan, (("age", 3.0), ("sex", 1.0)), lambda share: None)
+    both = with_patient(state, Patient(2, other.name, reading, scan, (), fit))
+    change = engine.surface(request_for(replace(both, compared=1), CHANGE, 128))
+    assert change.volume_before_cm3 == pytest.approx(state.fit.volume_cm3)
+    assert change.colouring.values_mm[np.abs(change.normals[:, 2]) > 0.98].mean() < -4
+    clinic.forget(fit)
+
+
+def test_nobody_else_sees_a_patients_code(desk, egg_atlas):
+    engine, _, state = desk
+    average = replace(state, patient=None)
+    mine = engine.surface(request_for(state, FULL_SHAPE, 128))
+    theirs = engine.surface(request_for(average, FULL_SHAPE, 128))
+    assert mine.points_mm is not theirs.points_mm and theirs.volume_margin_cm3 is None
+    expected = Atlas.load(egg_atlas).shape(dict(state.named))
+    np.testing.assert_allclose(theirs.points_mm, expected.vertices, atol=1e-3)
+
+
+def test_a_far_scan_is_shown_blocked_and_can_be_aligned(desk, egg_atlas, tmp_path):
+    _, clinic, _ = desk
+    path = tmp_path / "far.stl"
+    mesh = egg(6.0, 1.0)
+    mesh.apply_translation([500, 0, 0])
+    mesh.export(path)
+    assert "align it" in clinic.read(egg_atlas, Reading(path), ()).blocked
+    aligned = clinic.read(egg_atlas, Reading(path, align="icp"), KNOWN)
+    assert not aligned.blocked and "icp" in aligned.alignment
+    assert np.abs(aligned.points_mm.mean(axis=0)).max() < 5
+
+
+def test_a_cloud_is_thinned_for_display_only(desk, egg_atlas, tmp_path):
+    _, clinic, _ = desk
+    path = tmp_path / "cloud.xyz"
+    np.savetxt(path, trimesh.sample.sample_surface(egg(5.0, -1.0), 3 * SHOWN_POINTS, seed=0)[0])
+    scan = clinic.read(egg_atlas, Reading(path), ())
+    assert len(scan.faces) == 0 and 0 < len(scan.points_mm) <= SHOWN_POINTS
+    fit = clinic.fit(egg_atlas, scan, (("age", 5.0),), lambda share: None)
+    assert fit.residual_mm < 0.5
+    clinic.forget(fit)
+
+
+def test_what_cannot_be_read_is_one_sentence(desk, egg_atlas, tmp_path):
+    path = tmp_path / "empty.stl"
+    path.write_bytes(b"")
+    with pytest.raises(InputError, match=r"empty\.stl"):
+        desk[1].read(egg_atlas, Reading(path), ())
+
+
+@pytest.mark.parametrize("share", [0.0, 0.81])
+def test_a_fit_that_is_stopped_leaves_nobody_behind(desk, egg_atlas, share):
+    """While it fits, or while the surface is made that its volume is measured on."""
+    engine, clinic, state = desk
+    people, told = dict(engine._members), [0.0]
+    with pytest.raises(Cancelled):
+        clinic.fit(egg_atlas, state.shown.scan, KNOWN, told.append, lambda: told[-1] >= share)
+    assert engine._members == people
+
+
+@pytest.mark.parametrize(("length", "expected"), [(2.84, 2), (3.6, 5), (22, 20), (0.9, 1), (69, 50)])
+def test_colour_scales_end_at_round_numbers(length, expected):
+    assert rounded(length) == pytest.approx(expected)

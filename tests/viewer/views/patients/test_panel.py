@@ -1,0 +1,512 @@
+"""Scans, known covariates and results on the right side, alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, QPointF, Qt, QTimer
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QScrollArea, QToolButton, QWidget
+from pytestqt.qtbot import QtBot
+
+from naisr_model.data import meshes, volumes
+from naisr_model.data.patients import POINT_ENDINGS
+from naisr_viewer.state.explorer import ExplorerState, opened, showing, with_patient, without_patient
+from naisr_viewer.state.patients import Fitted, Labels, Patient, Reading, Scan
+from naisr_viewer.views import dialogs
+from naisr_viewer.views.patients import panel as pp
+from naisr_viewer.views.patients.known import NumberField
+from naisr_viewer.views.patients.pieces import ChoiceBox
+from naisr_viewer.words.numbers import gained, volume
+from naisr_viewer.words.patients import UNITS, breakable, interval, sentence
+
+LEFT = Qt.MouseButton.LeftButton
+
+
+def scan(**facts) -> Scan:
+    corners = np.zeros((3, 3), np.float32)
+    return Scan(
+        corners, corners, np.array([[0, 1, 2]]), facts.pop("source", "p01.stl, 12,034 faces"), **facts
+    )
+
+
+FIT = Fitted(
+    person=1,
+    values=(("age", 84.0), ("weight", 21.43), ("sex", 1.0)),
+    intervals=(("weight", 18.23, 24.91), ("sex", -1.0, 1.0)),
+    volume_cm3=48.31,
+    volume_margin_cm3=2.13,
+    residual_mm=0.312,
+    lasting=0.36,
+    seconds=2.31,
+    remarks=("the shape does not tell sex: both levels explain it",),
+)
+ONE = Patient(1, "p01.stl", Reading(Path("/scans/p01.stl")), scan(volume_cm3=46.21))
+TWO = Patient(2, "p02.ply", Reading(Path("/scans/p02.ply")), scan(source="p02.ply, 800 faces"))
+
+
+@pytest.fixture
+def start(card) -> ExplorerState:
+    return opened(ExplorerState(), card)
+
+
+@pytest.fixture
+def panel(qtbot: QtBot, start) -> pp.PatientPanel:
+    panel = pp.PatientPanel()
+    qtbot.addWidget(panel)
+    panel.show_state(start)
+    panel.resize(pp.PANEL_WIDTH, 1300)
+    panel.show()
+    qtbot.waitExposed(panel)
+    panel.activateWindow()
+    qtbot.waitUntil(panel.isActiveWindow)  # only then a click gives a field the focus
+    return panel
+
+
+@pytest.fixture
+def heard(panel) -> list[tuple]:
+    acts: list[tuple] = []
+    for name in (
+        "open_requested",
+        "patient_chosen",
+        "close_requested",
+        "reread_requested",
+        "reading_changed",
+        "fit_requested",
+        "compared_chosen",
+        "ghost_toggled",
+    ):
+        getattr(panel, name).connect(lambda *said, name=name: acts.append((name, *said)))
+    return acts
+
+
+def words(widget: QWidget) -> str:
+    """All that can be read."""
+    texts = [each.text() for each in widget.findChildren(QLabel) if each.isVisible()]
+    return "\n".join(texts).replace("\u200b", "")
+
+
+def click(widget: QWidget) -> None:
+    QTest.mouseClick(widget, LEFT)
+
+
+def click_row(panel: pp.PatientPanel, row: int) -> None:
+    where = panel.list.visualItemRect(panel.list.item(row)).center()
+    QTest.mouseClick(panel.list.viewport(), LEFT, pos=where)
+
+
+def choose(box: ChoiceBox, text: str) -> None:
+    """Open a combo box and go to an entry with the keyboard."""
+    box.setFocus()
+    QTest.keyClick(box, Qt.Key.Key_Space)
+    steps = box.findText(text) - box.currentIndex()
+    for _ in range(abs(steps)):
+        QTest.keyClick(box.view(), Qt.Key.Key_Down if steps > 0 else Qt.Key.Key_Up)
+    QTest.keyClick(box.view(), Qt.Key.Key_Return)
+
+
+def field(panel: pp.PatientPanel, name: str):
+    return panel.known.rows[name].field
+
+
+def write(box: NumberField, text: str) -> None:
+    """Click into a field and type over what is there."""
+    QTest.mouseClick(box.lineEdit(), LEFT)
+    box.selectAll()
+    QTest.keyClicks(box, text)
+
+
+# --- words --------------------------------------------------------------------------------------
+
+
+def test_figures_have_digits_that_mean_something(card):
+    assert volume(48.31, 2.13) == "48.3 ± 2.1 cm³"
+    assert volume(48.31, 0.0213) == "48.310 ± 0.021 cm³"
+    assert volume(62410.3, 1234.0) == "62,400 ± 1,200 cm³"
+    assert volume(48.31, 0.0) == volume(48.31) == "48.3 cm³"
+    assert volume(62410.3) == "62,410 cm³"
+    assert gained(61.0, 48.3) == "+12.7 cm³ (+26 %)"
+    assert gained(48.3, 61.0) == "−12.7 cm³ (−21 %)"
+    age, weight, sex = card.covariates
+    assert interval(age, 71.2, 96.8) == "95 %: 71 to 97 months"
+    assert interval(weight, 18.23, 24.91) == "95 %: 18.2 to 24.9 kg"
+    assert interval(sex, -1, 1) == "inferred; F or M"
+    assert interval(sex, 1, 1) == "inferred"
+
+
+def test_a_long_name_can_be_broken_and_a_sentence_begins_with_a_capital():
+    name = "a_segmentation_that_somebody_named_at_length.nii.gz"
+    assert breakable(f"{name}, label 2").replace("\u200b", "") == f"{name}, label 2"
+    assert "\u200b" in breakable(name)
+    assert sentence("the surface is open") == "The surface is open"
+    assert sentence("p01.stl: all is well") == "p01.stl: all is well"
+
+
+# --- the list -----------------------------------------------------------------------------------
+
+
+def test_without_patients_it_invites_to_open_one(panel, heard):
+    assert pp.INVITATION in words(panel)
+    for part in (panel.list, panel.scan, panel.alignment, panel.known, panel.result, panel.compare):
+        assert not part.isVisible()
+    click(panel.open)
+    assert heard == [("open_requested",)]
+
+
+def test_without_an_atlas_nothing_can_be_opened(panel):
+    panel.show_state(ExplorerState())
+    assert not panel.open.isEnabled()
+
+
+def test_the_list_names_everybody_and_chooses(panel, start, heard):
+    state = with_patient(with_patient(start, replace(ONE, fit=FIT)), TWO)
+    panel.show_state(state)
+    for word in (pp.AVERAGE, "p01.stl", "48.3 cm³", "p02.ply", "not fitted"):
+        assert word in words(panel.list).split("\n")
+    assert panel.list.currentRow() == 2
+    assert heard == []
+    click_row(panel, 1)
+    click_row(panel, 0)
+    QTest.keyClick(panel.list, Qt.Key.Key_Down)
+    assert heard == [("patient_chosen", 1), ("patient_chosen", None), ("patient_chosen", 1)]
+
+
+def test_patients_are_closed_by_button_and_key(panel, start, heard):
+    panel.show_state(with_patient(with_patient(start, ONE), TWO))
+    first, second = panel.list.findChildren(QToolButton)
+    assert (first.accessibleName(), second.accessibleName()) == ("Close p01.stl", "Close p02.ply")
+    click(first)
+    panel.list.setFocus()
+    QTest.keyClick(panel.list, Qt.Key.Key_Delete)
+    assert heard == [("close_requested", 1), ("close_requested", 2)]
+    panel.show_state(showing(with_patient(start, ONE), None))
+    QTest.keyClick(panel.list, Qt.Key.Key_Delete)  # the average cannot be closed
+    assert len(heard) == 2
+    panel.show_state(without_patient(with_patient(start, ONE), 1))
+    assert not panel.list.isVisible()
+
+
+def test_the_list_grows_to_four_rows(panel, start):
+    heights = []
+    state = start
+    for key in range(1, 7):
+        state = with_patient(state, replace(ONE, key=key))
+        panel.show_state(state)
+        heights.append(panel.list.height())
+    assert heights[0] < heights[1] < heights[2] == heights[3] == heights[5]
+    assert panel.list.visualItemRect(panel.list.currentItem()).bottom() <= panel.list.viewport().height()
+
+
+# --- the scan and where it lies -----------------------------------------------------------------
+
+
+def test_the_scan_is_described_and_its_trouble_told(panel, start, heard):
+    notes = ("the surface is open", "its numbers look like metres")
+    trouble = "the shape lies 412 mm from the middle; align it to the atlas"
+    panel.show_state(with_patient(start, replace(ONE, scan=scan(notes=notes, blocked=trouble))))
+    said = words(panel.scan)
+    for word in (
+        "p01.stl, 12,034 faces",
+        "open surface, no volume",
+        "The surface is open",
+        "Its numbers look",
+    ):
+        assert word in said
+    assert panel.scan.blocked.text() == trouble.capitalize()
+    assert not panel.known.fit.isEnabled()
+    panel.show_state(with_patient(start, ONE))
+    assert "encloses 46.2 cm³" in words(panel.scan)
+    assert not panel.scan.blocked.isVisible()
+    assert not panel.scan.notes.isVisible()
+    assert panel.known.fit.isEnabled()
+    assert heard == []
+
+
+def test_a_changed_file_is_pointed_out_and_read_again(panel, start, heard):
+    panel.show_state(with_patient(start, ONE))
+    assert "changed on disk" not in words(panel)
+    click(panel.scan.reread)
+    panel.show_state(with_patient(start, replace(ONE, is_changed=True)))
+    assert "changed on disk" in words(panel)
+    assert not panel.scan.reread.isVisible()
+    click(panel.scan.reread_changed)
+    assert heard == [("reread_requested",)] * 2
+
+
+def test_the_ghost_is_switched(panel, start, heard):
+    panel.show_state(with_patient(start, ONE))
+    assert panel.scan.ghost.isChecked()
+    QTest.mouseClick(panel.scan.ghost, LEFT, pos=QPoint(8, panel.scan.ghost.height() // 2))
+    panel.show_state(replace(with_patient(start, ONE), has_ghost=False))
+    assert not panel.scan.ghost.isChecked()
+    assert heard == [("ghost_toggled", False)]
+
+
+def test_an_alignment_and_a_unit_are_asked_for(panel, start, heard):
+    panel.show_state(with_patient(start, ONE))
+    assert panel.alignment.hint.isVisible()
+    choose(panel.alignment.method, "rigid (ICP)")
+    choose(panel.alignment.unit, "m")
+    assert heard == [
+        ("reading_changed", replace(ONE.reading, align="icp")),
+        ("reading_changed", replace(ONE.reading, scale=1000.0)),
+    ]
+    told = "aligned by icp; mean distance 6.31 mm before, 1.02 mm after"
+    moved = replace(ONE, reading=replace(ONE.reading, align="icp"), scan=scan(alignment=told), fit=FIT)
+    panel.show_state(with_patient(start, moved))
+    assert panel.alignment.method.currentData() == "icp"
+    assert panel.alignment.unit.currentText() == "guessed"
+    assert told.capitalize() in words(panel.alignment)
+    assert not panel.alignment.hint.isVisible()
+    choose(panel.alignment.method, "rigid (ICP)")
+    assert len(heard) == 2  # nothing new
+
+
+def test_any_scale_is_shown(panel, start):
+    panel.show_state(with_patient(start, replace(ONE, reading=replace(ONE.reading, scale=0.5))))
+    assert panel.alignment.unit.currentText() == "0.5 mm"
+    panel.show_state(with_patient(start, ONE))
+    assert panel.alignment.unit.count() == len(UNITS)
+
+
+def test_landmarks_need_a_file(panel, start, heard, monkeypatch):
+    panel.show_state(with_patient(start, ONE))
+    answers = ["", "/scans/p01.csv"]
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (answers.pop(0), ""))
+    choose(panel.alignment.method, "landmarks…")
+    assert heard == []
+    assert panel.alignment.method.currentData() == "none"
+    choose(panel.alignment.method, "landmarks…")
+    assert heard == [
+        ("reading_changed", replace(ONE.reading, align="landmarks", landmarks=Path("/scans/p01.csv")))
+    ]
+
+
+# --- what is known ------------------------------------------------------------------------------
+
+
+def test_nothing_is_known_at_first(panel, start, heard):
+    panel.show_state(with_patient(start, ONE))
+    for row in panel.known.rows.values():
+        assert not row.check.isChecked()
+    assert field(panel, "age").text() == ""
+    assert field(panel, "age").lineEdit().placeholderText() == "infer"
+    assert panel.known.rows["sex"].note.text() == "infer"
+    click(panel.known.fit)
+    assert heard == [("fit_requested", ())]
+
+
+def test_what_is_typed_is_known(panel, start, heard):
+    panel.show_state(with_patient(start, ONE))
+    click(field(panel, "sex").buttons[1])
+    write(field(panel, "weight"), "20.4")
+    assert panel.known.rows["weight"].check.isChecked()
+    assert not panel.known.rows["age"].check.isChecked()
+    click(panel.known.fit)
+    assert heard == [("fit_requested", (("weight", 20.4), ("sex", 1.0)))]
+    field(panel, "weight").selectAll()
+    QTest.keyClick(field(panel, "weight"), Qt.Key.Key_Backspace)
+    assert not panel.known.rows["weight"].check.isChecked()
+    assert panel.known.given() == (("sex", 1.0),)
+
+
+def test_a_tick_proposes_the_mean_to_be_typed_over(panel, start, qtbot):
+    panel.show_state(with_patient(start, ONE))
+    row = panel.known.rows["age"]
+    QTest.mouseClick(row.check, LEFT, pos=QPoint(8, row.check.height() // 2))
+    qtbot.waitUntil(lambda: field(panel, "age").hasFocus())
+    assert panel.known.given() == (("age", 100.0),)
+    QTest.keyClicks(field(panel, "age"), "84")
+    assert panel.known.given() == (("age", 84.0),)
+    QTest.mouseClick(row.check, LEFT, pos=QPoint(8, row.check.height() // 2))
+    assert panel.known.given() == ()
+    assert field(panel, "age").text() == ""
+    sex = panel.known.rows["sex"]
+    QTest.mouseClick(sex.check, LEFT, pos=QPoint(8, sex.check.height() // 2))
+    assert panel.known.given() == (("sex", -1.0),)
+    assert sex.note.text() == ""
+
+
+def test_arrow_keys_begin_at_the_mean(panel, start):
+    panel.show_state(with_patient(start, ONE))
+    age = field(panel, "age")
+    age.setFocus()
+    QTest.keyClick(age, Qt.Key.Key_Up)
+    assert panel.known.given() == (("age", 100.0 + age.singleStep()),)
+
+
+def test_a_value_is_told_as_it_was_typed_and_ends_of_the_range_as_they_are(panel, start, card):
+    panel.show_state(with_patient(start, ONE))
+    write(field(panel, "weight"), "950")
+    QTest.keyClick(field(panel, "weight"), Qt.Key.Key_Return)
+    assert dict(panel.known.given())["weight"] == 950.0
+    assert "4 to 95 kg" in field(panel, "weight").toolTip()
+    narrow = replace(card.covariates[0], range=(1.44, 220.44))
+    number = NumberField(narrow, panel)
+    number.give(220.44)
+    assert number.given() == 220.44
+    number.give(1.44)
+    assert number.given() == 1.44  # the box says 1, which is outside
+
+
+def test_typing_outlives_other_news(panel, start):
+    state = with_patient(start, ONE)
+    panel.show_state(state)
+    write(field(panel, "age"), "84")
+    panel.show_state(with_patient(replace(state, has_ghost=False), replace(ONE, is_changed=True)))
+    assert field(panel, "age").text() == "84"
+    assert field(panel, "age").hasFocus()
+    panel.show_state(with_patient(state, TWO))
+    assert panel.known.given() == ()
+    click(field(panel, "sex").buttons[0])
+    panel.show_state(showing(with_patient(state, TWO), 1))
+    assert panel.known.given() == (("age", 84.0),)
+    panel.show_state(with_patient(state, TWO))
+    assert panel.known.given() == (("sex", -1.0),)
+
+
+def test_what_a_fit_was_told_is_shown(panel, start):
+    panel.show_state(with_patient(start, ONE))
+    panel.show_state(with_patient(start, replace(ONE, known=(("age", 84.0), ("sex", 1.0)), fit=FIT)))
+    assert panel.known.given() == (("age", 84.0), ("sex", 1.0))
+    assert panel.known.fit.text() == "Fit again"
+
+
+def test_another_atlas_has_other_rows(panel, start, card):
+    other = replace(card, covariates=card.covariates[:1])
+    panel.show_state(opened(start, other))
+    assert list(panel.known.rows) == ["age"]
+
+
+def test_the_wheel_scrolls_and_changes_nothing_under_the_pointer(panel, start, heard, qtbot):
+    panel.resize(pp.PANEL_WIDTH, 400)
+    panel.show_state(with_patient(start, ONE))
+    area = panel.findChild(QScrollArea)
+    bar = area.verticalScrollBar()
+    qtbot.waitUntil(lambda: bar.maximum() > 60)
+    for widget in (panel.alignment.method, panel.alignment.unit, field(panel, "age")):
+        area.ensureWidgetVisible(widget)
+        before, middle = bar.value(), widget.mapTo(panel, widget.rect().center())
+        assert panel.rect().contains(middle) and before < bar.maximum()
+        QTest.wheelEvent(panel.windowHandle(), QPointF(middle), QPoint(0, -120))
+        assert bar.value() > before
+    assert heard == []
+    assert panel.known.given() == ()
+
+
+def test_the_tab_key_goes_from_top_to_bottom(panel, start, qtbot):
+    other = replace(TWO, fit=FIT)
+    panel.show_state(with_patient(with_patient(start, other), replace(ONE, fit=FIT)))
+    panel.open.setFocus()
+    qtbot.waitUntil(panel.open.hasFocus)
+    seen = []
+    for _ in range(14):
+        QTest.keyClick(panel.window(), Qt.Key.Key_Tab)
+        seen.append(QApplication.focusWidget())
+    expected = [panel.list, panel.scan.reread, panel.scan.ghost, panel.alignment.method, panel.alignment.unit]
+    assert [each for each in seen if each in [*expected, *panel.known.stops(), panel.compare.box]] == [
+        *expected,
+        *panel.known.stops(),
+        panel.compare.box,
+    ]
+
+
+# --- what was found -----------------------------------------------------------------------------
+
+
+def test_the_result_tells_values_and_how_sure_they_are(panel, start):
+    panel.show_state(with_patient(start, replace(ONE, fit=FIT)))
+    said = words(panel.result).split("\n")
+    for word in ("84 months", "known", "21.4 kg", "95 %: 18.2 to 24.9 kg", "M", "inferred; F or M"):
+        assert word in said
+    for word in ("48.3 ± 2.1 cm³ (95 %)", "0.31 mm", "2.3 s"):
+        assert word in said
+    assert "The shape does not tell sex: both levels explain it" in said
+    panel.show_state(
+        with_patient(start, replace(ONE, fit=replace(FIT, person=2, volume_cm3=50.0, remarks=())))
+    )
+    assert "50.0 ± 2.1 cm³ (95 %)" in words(panel.result)
+    assert "does not tell" not in words(panel.result)
+
+
+def test_a_new_result_is_scrolled_to(panel, start, qtbot):
+    panel.resize(pp.PANEL_WIDTH, 500)
+    panel.show_state(with_patient(start, ONE))
+    qtbot.wait(20)
+    panel.show_state(with_patient(start, replace(ONE, fit=FIT)))
+    last = panel.result.findChildren(QLabel)[-1]
+
+    def is_in_sight() -> bool:
+        return bool(last.mapTo(panel, QPoint(0, last.height())).y() <= panel.height())
+
+    qtbot.waitUntil(lambda: panel.result.height() > 150 and is_in_sight())
+
+
+def test_other_fitted_patients_can_be_compared_with(panel, start, heard):
+    state = with_patient(with_patient(start, replace(TWO, fit=FIT)), replace(ONE, key=3, name="p03.stl"))
+    panel.show_state(with_patient(state, replace(ONE, fit=FIT)))
+    texts = [panel.compare.box.itemText(i) for i in range(panel.compare.box.count())]
+    assert texts == ["this patient as fitted", "p02.ply"]
+    choose(panel.compare.box, "p02.ply")
+    panel.show_state(replace(with_patient(state, replace(ONE, fit=FIT)), compared=2))
+    assert panel.compare.box.currentData() == 2
+    choose(panel.compare.box, "this patient as fitted")
+    assert heard == [("compared_chosen", 2), ("compared_chosen", None)]
+    assert state.patient == 3
+    panel.show_state(state)
+    assert not panel.compare.isVisible()
+
+
+def test_nothing_can_be_changed_during_a_fit(panel, start, heard):
+    panel.show_state(with_patient(start, ONE))
+    panel.set_editable(False)
+    click(panel.known.fit)
+    click(panel.open)
+    assert heard == []
+    panel.set_editable(True)
+    click(panel.open)
+    assert heard == [("open_requested",)]
+
+
+def test_nothing_is_cut_off_on_the_right(panel, start):
+    name = "subject_0001_visit_2_airway_segmentation_final_corrected.nii.gz"
+    notes = (f"{name} is odd", "the surface is open: a hole of 1.2% of its area; close it")
+    patient = replace(ONE, name=name, scan=scan(source=f"{name}, label 2", notes=notes), fit=FIT)
+    panel.show_state(with_patient(start, patient))
+    assert panel.list.parentWidget().minimumSizeHint().width() <= pp.PANEL_WIDTH - 12
+
+
+# --- dialogs ------------------------------------------------------------------------------------
+
+
+def test_every_ending_that_the_model_reads_can_be_chosen(panel, monkeypatch):
+    readable = meshes.READERS | POINT_ENDINGS | set(volumes.ENDINGS)
+    assert {f".{ending}" for ending in dialogs.SCAN_ENDINGS} == readable
+    offered: list[str] = []
+
+    def answer(_parent: QWidget, _title: str, _folder: str, filters: str) -> tuple[str, str]:
+        offered.append(filters)
+        return "/scans/p01.stl", filters
+
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", answer)
+    assert dialogs.ask_scan_path(panel) == Path("/scans/p01.stl")
+    assert all(f"*{ending}" in offered[0] for ending in readable)
+
+
+def test_a_label_is_chosen_by_its_title(panel):
+    labels = Labels(Reading(Path("/scans/p01.nii.gz")), ((1, "1: 3.2 cm3"), (4, "4 'airway': 41.9 cm3")))
+
+    def answer(key: Qt.Key) -> None:
+        dialog = QApplication.activeModalWidget()
+        assert isinstance(dialog, dialogs.LabelDialog)
+        assert "p01.nii.gz holds 2 labels" in words(dialog)
+        QTest.keyClick(dialog.choice, Qt.Key.Key_Down)
+        QTest.keyClick(dialog, key)
+
+    QTimer.singleShot(0, lambda: answer(Qt.Key.Key_Return))
+    assert dialogs.ask_label(panel, labels) == 4
+    QTimer.singleShot(0, lambda: answer(Qt.Key.Key_Escape))
+    assert dialogs.ask_label(panel, labels) is None

@@ -1,0 +1,531 @@
+"""The linked sub-plots."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import pyvista as pv
+import trimesh
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QColor, QImage
+from PySide6.QtTest import QTest
+from pytestqt.qtbot import QtBot
+
+from naisr_viewer.state.explorer import (
+    BEFORE,
+    CERTAINTY,
+    CHANGE,
+    FULL_SHAPE,
+    SCAN,
+    TEMPLATE,
+    AtlasCard,
+    ExplorerState,
+    Panel,
+    all_panels,
+    opened,
+    panel_values,
+    with_value,
+)
+from naisr_viewer.state.requests import Colouring, SurfaceRequest, SurfaceResult
+from naisr_viewer.views.shapes import canvas as cv
+from naisr_viewer.views.shapes import shape_view as sv
+from naisr_viewer.views.shapes.cell import CAPTION_PX
+from naisr_viewer.views.shapes.grid import cells, columns_for
+from naisr_viewer.views.shapes.scale_bar import round_length_mm
+from naisr_viewer.views.theme import DARK, LIGHT, SCAN_COLOUR, SHAPE_COLOUR, scale_colours
+
+
+def test_cells_cover_the_canvas_without_overlap():
+    for count in range(1, 9):
+        for columns in range(1, count + 1):
+            boxes = cells(count, columns)
+            assert len(boxes) == count
+            assert sum(width * height for _, _, width, height in boxes) == pytest.approx(1)
+
+
+def test_tall_shapes_stand_in_a_row_and_flat_ones_are_stacked():
+    assert columns_for(5, canvas_aspect=2.0, shape_aspect=0.3) == 5
+    assert columns_for(5, canvas_aspect=0.5, shape_aspect=4.0) == 1
+    assert columns_for(5, canvas_aspect=1.4, shape_aspect=0.9) == 3
+    assert columns_for(1, canvas_aspect=1.4, shape_aspect=0.9) == 1
+
+
+@pytest.mark.parametrize(("pixels_per_mm", "length_mm"), [(1.0, 50), (0.9, 100), (4.0, 20), (100.0, 0.5)])
+def test_scale_bars_have_round_lengths(pixels_per_mm, length_mm):
+    assert round_length_mm(pixels_per_mm) == pytest.approx(length_mm)
+
+
+def test_a_box_is_seen_at_its_true_size():
+    camera = pv.Camera()
+    camera.focal_point, camera.position, camera.up = (0, 0, 0), (0, -1, 0), (0, 0, 1)
+    box = np.array([[-1.0, 1.0], [-2.0, 2.0], [0.0, 6.0]])
+    cv.aim(camera, box)
+    assert cv.seen_size(camera, box) == pytest.approx((2.0, 6.0))
+    np.testing.assert_allclose(camera.focal_point, [0, 0, 3])
+
+
+def test_closed_surfaces_are_told_from_open_ones():
+    faces = trimesh.creation.icosphere(subdivisions=1).faces
+    assert cv.is_closed(faces)
+    assert not cv.is_closed(faces[:-1])
+    assert not cv.is_closed(np.vstack([faces[:-1], faces[-1][::-1]]))
+    assert not cv.is_closed(faces[:0])
+
+
+@pytest.fixture
+def view(qtbot: QtBot, engine, card: AtlasCard) -> Iterator[sv.ShapeView]:
+    view = sv.ShapeView()
+    view.resize(900, 600)
+    view.show_atlas(card, LIGHT)
+    view.show_panels(all_panels(card))
+    view.show()
+    qtbot.waitExposed(view)
+    show(view, engine, card)
+    yield view
+    view.clear()
+    view.deleteLater()
+
+
+def show(view: sv.ShapeView, engine, card: AtlasCard, **values: float) -> None:
+    state = opened(ExplorerState(), card)
+    for name, value in values.items():
+        state = with_value(state, name, value)
+    for panel in all_panels(card):
+        view.show_surface(engine.surface(SurfaceRequest(card.path, panel, panel_values(state, panel), 40)))
+    QTest.qWait(30)
+
+
+def rows_of_colour(view: sv.ShapeView, colour: str) -> int:
+    """How many pixel rows hold a hue like ``colour``."""
+    picture = view.grab().toImage()
+    hue = QColor(colour).hue()
+    count = 0
+    for y in range(0, picture.height(), 2):
+        line = [picture.pixelColor(x, y) for x in range(0, picture.width(), 6)]
+        count += any(abs(c.hue() - hue) < 12 and c.saturation() > 70 for c in line)
+    return 2 * count
+
+
+def drawn_by(view: sv.ShapeView, act) -> list[int]:
+    """How many sub-plots each painting that follows ``act`` had to draw, where it had to draw any."""
+    counts: list[int] = []
+    view.drawn.connect(counts.append)
+    act()
+    QTest.qWait(60)
+    view.drawn.disconnect(counts.append)
+    return [count for count in counts if count]
+
+
+def moved(result, offset_mm: float):
+    """The same surface, moved upwards; the faces are the same array."""
+    return replace(result, points_mm=result.points_mm + np.array([0, 0, offset_mm], np.float32))
+
+
+def pixels(view: sv.ShapeView) -> np.ndarray:
+    """The canvas without labels, red, green and blue, ``[height, width, 3]``."""
+    assert view._canvas is not None
+    image = view._canvas.grabFramebuffer().convertToFormat(QImage.Format.Format_RGB32)
+    flat = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), image.bytesPerLine() // 4, 4)
+    return flat[:, : image.width(), 2::-1].copy()
+
+
+def inside(view: sv.ShapeView, panel: Panel) -> tuple[slice, slice]:
+    """Rows and columns of a sub-plot's shape in :func:`pixels`."""
+    title, volume = view.title(panel).geometry(), view._cells[panel].volume.geometry()
+    return slice(title.bottom() + 1, volume.top()), slice(title.left(), title.right() + 1)
+
+
+def test_only_what_changed_is_drawn_and_all_of_it_at_once(view):
+    first, second = view._cells[TEMPLATE].result, view._cells[FULL_SHAPE].result
+
+    def two_of_five() -> None:
+        view.show_surface(moved(first, 1.0))
+        view.show_surface(moved(second, 1.0))
+
+    assert drawn_by(view, two_of_five) == [2]
+    assert drawn_by(view, lambda: view.show_surface(view._cells[TEMPLATE].result)) == []
+    assert drawn_by(view, view._canvas.update) == []
+
+
+def test_sub_plots_that_are_not_drawn_again_keep_their_pixels(view):
+    before = pixels(view)
+    template, shape = inside(view, TEMPLATE), inside(view, FULL_SHAPE)
+    assert len(np.unique(before[template].reshape(-1, 3), axis=0)) > 20
+    for step in range(1, 4):
+        view.show_surface(moved(view._cells[FULL_SHAPE].result, 2.0 * step))
+        QTest.qWait(30)
+        now = pixels(view)
+        np.testing.assert_array_equal(now[template], before[template])
+        assert (now[shape] != before[shape]).any()
+    view._canvas.refresh()
+    np.testing.assert_allclose(pixels(view).astype(int), now, atol=3)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda view: view.look_from("above"),
+        lambda view: view.reset_camera(),
+        lambda view: view.resize(800, 500),
+        lambda view: view.set_theme(DARK),
+        lambda view: view.set_moving(True),
+        lambda view: QTest.mouseClick(view._canvas, Qt.MouseButton.LeftButton),
+    ],
+    ids=["direction", "framing", "size", "theme", "quality", "mouse"],
+)
+def test_what_concerns_all_draws_all(view, change):
+    assert drawn_by(view, lambda: change(view))[0] == len(view._visible)
+
+
+def test_moved_vertices_leave_the_triangles_in_opengl_alone(view):
+    mesh, result = view._canvas._plots[0].mesh, view._cells[TEMPLATE].result
+    triangles, since = mesh.GetPolys(), mesh.GetPolys().GetMTime()
+    original = result.points_mm.copy()
+    view.show_surface(moved(result, 5.0))
+    assert view._canvas._plots[0].mesh is mesh
+    assert mesh.GetPolys() is triangles
+    assert triangles.GetMTime() == since
+    assert mesh.bounds[5] == pytest.approx(original[:, 2].max() + 5, abs=1e-4)
+    np.testing.assert_array_equal(result.points_mm, original)
+
+
+def test_a_moved_surface_is_drawn_like_a_new_one(view):
+    result = view._cells[FULL_SHAPE].result
+    view.show_surface(moved(result, 6.0))
+    in_place = pixels(view)
+    view.show_surface(replace(moved(result, 6.0), faces=result.faces.copy()))
+    np.testing.assert_array_equal(pixels(view), in_place)
+    view.show_surface(result)
+    assert (pixels(view) != in_place).any()
+
+
+def test_surfaces_shown_before_anything_can_draw_appear_later(qtbot, engine, card, monkeypatch):
+    monkeypatch.delitem(sys.modules, sv.DRAWING)
+    view = sv.ShapeView()
+    qtbot.addWidget(view)
+    view.resize(600, 400)
+    view.show_atlas(card, LIGHT)
+    view.show_panels(all_panels(card))
+    assert not view.is_ready
+    view.show()
+    show(view, engine, card)
+    qtbot.waitUntil(lambda: view.is_ready, timeout=10_000)
+    QTest.qWait(50)
+    assert rows_of_colour(view, SHAPE_COLOUR) > 50
+    view.clear()
+
+
+def test_an_older_child_is_drawn_taller(view, engine, card):
+    view.show_panels((FULL_SHAPE,))
+    show(view, engine, card)
+    young = rows_of_colour(view, SHAPE_COLOUR)
+    show(view, engine, card, age=200.0)
+    old = rows_of_colour(view, SHAPE_COLOUR)
+    assert young > 100
+    assert old / young == pytest.approx((45 + 15) / 45, rel=0.08)
+
+
+def test_labels_follow_the_layout(view):
+    assert "Age only" in view.title(Panel("effect", "age")).text()
+    assert "do not add up" in view.title(Panel("effect", "age")).toolTip()
+    view.show_panels((FULL_SHAPE,))
+    assert view.title(FULL_SHAPE).isVisible()
+    assert not view.title(TEMPLATE).isVisible()
+    assert view.title(FULL_SHAPE).width() == view.width()
+
+
+def test_captions_are_shown_as_given(view):
+    view.set_caption(TEMPLATE, "48.2 cm³", "Enclosed volume")
+    assert view.caption(TEMPLATE) == "48.2 cm³"
+
+
+def test_all_sub_plots_share_one_camera(view):
+    assert len({id(renderer.camera) for renderer in view._canvas.renderers}) == 1
+
+
+def test_the_mouse_turns_all_shapes_at_once_and_draws_once_per_paint(view):
+    canvas = view._canvas
+    position = canvas.camera.position
+    QTest.mousePress(canvas, Qt.MouseButton.LeftButton, pos=QPoint(100, 150))
+    QTest.mouseMove(canvas, QPoint(160, 170))
+    assert canvas.ren_win.GetMultiSamples() == 0
+    assert drawn_by(view, lambda: None) == [len(view._visible)]
+    QTest.mouseRelease(canvas, Qt.MouseButton.LeftButton, pos=QPoint(160, 170))
+    assert canvas.ren_win.GetMultiSamples() == cv.REST_SAMPLES
+    assert np.linalg.norm(np.subtract(canvas.camera.position, position)) > 1
+    paintings: list[int] = []
+    QTest.qWait(50)
+    view.drawn.connect(paintings.append)
+    for _ in range(10):
+        canvas.refresh()
+    QTest.qWait(50)
+    view.drawn.disconnect(paintings.append)
+    assert paintings == [len(view._visible)]
+
+
+def test_the_users_zoom_survives_a_new_layout(view):
+    camera = view._canvas.camera
+    camera.parallel_scale /= 2
+    zoomed = view._fit_scale / camera.parallel_scale
+    view.show_panels((FULL_SHAPE,))
+    assert view._fit_scale / camera.parallel_scale == pytest.approx(zoomed)
+    view.reset_camera()
+    assert camera.parallel_scale == pytest.approx(view._fit_scale)
+
+
+def test_directions_are_anatomical(view):
+    view.look_from("the front")
+    camera = view._canvas.camera
+    forward = np.subtract(camera.focal_point, camera.position)
+    np.testing.assert_allclose(forward / np.linalg.norm(forward), [0, 1, 0], atol=1e-6)  # y points backwards
+
+
+def test_sampling_is_off_while_moving_and_made_up_for_at_rest(view):
+    smooth = pixels(view)
+    view.set_moving(True)
+    assert (pixels(view) != smooth).any()
+    view.set_moving(False)
+    np.testing.assert_array_equal(pixels(view), smooth)
+
+
+def test_no_surface_leaves_the_sub_plot_empty(view, engine, card, atlas, monkeypatch):
+    monkeypatch.setattr(atlas, "_surface", lambda *_: trimesh.Trimesh())
+    empty = engine.surface(SurfaceRequest(card.path, TEMPLATE, (), 48))
+    for _ in range(2):
+        view.show_surface(replace(empty))
+        QTest.qWait(20)
+    canvas = QColor(LIGHT.canvas)
+    assert (pixels(view)[inside(view, TEMPLATE)] == (canvas.red(), canvas.green(), canvas.blue())).all()
+
+
+def test_another_atlas_gets_a_canvas_of_its_own(view, engine, card):
+    first = view._canvas
+    view.show_atlas(card, DARK)
+    view.show_panels((TEMPLATE, FULL_SHAPE))
+    assert first._closed
+    show(view, engine, card)
+    assert rows_of_colour(view, SHAPE_COLOUR) > 50
+
+
+@pytest.fixture
+def views(view) -> sv.ShapeView:
+    """The sub-plots of a fit with one surface in all of them, seen from the left."""
+    view.show_panels((FULL_SHAPE, SCAN, CERTAINTY))
+    for panel in (FULL_SHAPE, SCAN, CERTAINTY, BEFORE, CHANGE):
+        view.show_surface(of(view, panel))
+    view.look_from("the left")
+    QTest.qWait(30)
+    return view
+
+
+def template(view: sv.ShapeView) -> SurfaceResult:
+    result = view._cells[TEMPLATE].result
+    assert result is not None
+    return result
+
+
+def of(view: sv.ShapeView, panel: Panel, values_mm=None, limit_mm: float = 2.0) -> SurfaceResult:
+    """The template's surface in another panel, coloured where there are values."""
+    result, colouring = template(view), None
+    if values_mm is not None:
+        values_mm = np.broadcast_to(np.asarray(values_mm, np.float32), len(result.points_mm)).copy()
+        colouring = Colouring(values_mm, limit_mm, is_signed=panel != CERTAINTY)
+    return replace(result, request=replace(result.request, panel=panel), colouring=colouring)
+
+
+def middle(view: sv.ShapeView, panel: Panel) -> np.ndarray:
+    """The median colour around the middle of a sub-plot's shape."""
+    rows, columns = inside(view, panel)
+    y, x = (rows.start + rows.stop) // 2, (columns.start + columns.stop) // 2
+    return np.asarray(np.median(pixels(view)[y - 4 : y + 5, x - 4 : x + 5].reshape(-1, 3), axis=0))
+
+
+def rgb(colour: str) -> np.ndarray:
+    wanted = QColor(colour)
+    return np.array([wanted.red(), wanted.green(), wanted.blue()], float)
+
+
+@pytest.mark.parametrize(("panel", "share"), [(SCAN, -1.0), (SCAN, 0.0), (SCAN, 1.0), (CERTAINTY, 0.5)])
+def test_a_surface_has_the_colours_of_its_bar(views, panel, share):
+    views.show_surface(of(views, panel, 2.0 * share))
+    place = share if panel == CERTAINTY else (share + 1) / 2
+    colours = scale_colours(is_signed=panel == SCAN)
+    seen, expected = middle(views, panel), rgb(colours[round(place * (len(colours) - 1))])
+    assert np.abs(seen - expected).max() < 25  # the light falls from the side
+    others = [rgb(colour) for colour in colours]
+    assert np.linalg.norm(seen - expected) < 1.01 * min(np.linalg.norm(seen - other) for other in others)
+
+
+def test_beyond_the_scale_the_colour_is_that_of_its_end(views):
+    views.show_surface(of(views, SCAN, 2.0))
+    at_the_end = pixels(views)
+    views.show_surface(of(views, SCAN, 40.0))
+    np.testing.assert_array_equal(pixels(views), at_the_end)
+
+
+def test_vertices_differ(views):
+    heights = template(views).points_mm[:, 2]
+    views.show_surface(of(views, SCAN, np.sign(heights)))
+    rows, columns = inside(views, SCAN)
+    shape = pixels(views)[rows, columns].astype(int)
+    redder = (shape[:, :, 0] - shape[:, :, 2]).sum(axis=1)
+    half = len(redder) // 2
+    assert redder[: half - 5].sum() > 1000 and redder[half + 5 :].sum() < -1000
+
+
+def test_colours_come_and_go_without_new_triangles(views):
+    plot = views._canvas._plots[views._index(SCAN)]
+    plain, mesh = pixels(views), plot.mesh
+    triangles, since = mesh.GetPolys(), mesh.GetPolys().GetMTime()
+    assert drawn_by(views, lambda: views.show_surface(of(views, SCAN, 1.0))) == [1]
+    coloured = pixels(views)
+    assert (coloured != plain).any()
+    assert drawn_by(views, lambda: views.show_surface(of(views, SCAN, -1.0))) == [1]
+    assert (pixels(views) != coloured).any()
+    assert drawn_by(views, lambda: views.show_surface(of(views, SCAN))) == [1]
+    np.testing.assert_array_equal(pixels(views), plain)
+    views.show_surface(moved(of(views, SCAN, 1.0), 3.0))
+    assert plot.mesh is mesh and mesh.GetPolys() is triangles and triangles.GetMTime() == since
+
+
+def test_a_moved_coloured_surface_is_drawn_like_a_new_one(views):
+    views.show_surface(of(views, SCAN, 1.0))
+    result = moved(of(views, SCAN, -0.5), 4.0)
+    views.show_surface(result)
+    in_place = pixels(views)
+    views.show_surface(replace(result, faces=result.faces.copy()))
+    np.testing.assert_array_equal(pixels(views), in_place)
+
+
+def test_a_colour_bar_stands_between_shape_and_caption(views):
+    cell = views._cells[SCAN]
+    with_bar = {panel for panel, each in views._cells.items() if each.bar is not None}
+    assert with_bar == {SCAN, CERTAINTY, CHANGE}
+    bar, shape = cell.bar.geometry(), inside(views, SCAN)[0]
+    text_top = cell.volume.geometry().top() + cell.volume.contentsMargins().top()
+    assert shape.stop <= bar.top() and bar.bottom() < text_top
+    assert views.height() - text_top == CAPTION_PX
+    assert cell.bar.isVisible() and abs(bar.center().x() - cell.title.geometry().center().x()) <= 1
+    plain = views._cells[FULL_SHAPE].volume
+    assert plain.geometry().top() + plain.contentsMargins().top() == text_top
+
+
+def test_the_bar_keeps_its_numbers_while_a_preview_is_plain(views):
+    bar = views._cells[CHANGE].bar
+    assert bar.limit_mm is None
+    views.show_surface(of(views, CHANGE, 1.0, limit_mm=5.0))
+    views.show_surface(of(views, CHANGE))
+    assert bar.limit_mm == 5.0
+
+
+def test_the_usual_layouts_have_no_strip_for_bars(view, card):
+    usual, labels = pixels(view), view._cells[FULL_SHAPE].volume.geometry()
+    view.show_panels((FULL_SHAPE, SCAN, CERTAINTY))
+    view.show_panels(all_panels(card))
+    np.testing.assert_array_equal(pixels(view), usual)
+    assert view._cells[FULL_SHAPE].volume.geometry() == labels
+    assert not any(cell.bar.isVisible() for cell in view._cells.values() if cell.bar is not None)
+
+
+def test_hidden_sub_plots_are_not_drawn(view):
+    def all_of_a_patient() -> None:
+        for panel in (SCAN, CERTAINTY, BEFORE, CHANGE):
+            view.show_surface(of(view, panel))
+
+    assert drawn_by(view, all_of_a_patient) == []
+
+
+def test_panels_stand_in_the_order_asked_for(views):
+    views.show_panels((BEFORE, FULL_SHAPE, CHANGE))
+    lefts = [views.title(panel).x() for panel in (BEFORE, FULL_SHAPE, CHANGE)]
+    assert lefts == sorted(lefts) and len(set(lefts)) == 3
+    assert not views.title(SCAN).isVisible()
+
+
+def ghost_of(view: sv.ShapeView, scale: float) -> tuple[np.ndarray, np.ndarray]:
+    result = template(view)
+    return result.points_mm * np.float32(scale), result.faces
+
+
+@pytest.mark.parametrize(("theme", "is_darker"), [(LIGHT, True), (DARK, False)], ids=["light", "dark"])
+def test_a_ghost_lies_over_the_full_shape_alone(views, theme, is_darker):
+    views.set_theme(theme)
+    QTest.qWait(30)
+    before, bare = pixels(views), middle(views, FULL_SHAPE)
+    points_mm, faces = ghost_of(views, 1.1)
+    assert drawn_by(views, lambda: views.show_ghost(points_mm, faces)) == [1]
+    assert drawn_by(views, lambda: views.show_ghost(points_mm, faces)) == []
+    after, veiled = pixels(views), middle(views, FULL_SHAPE)
+    assert (veiled.sum() < bare.sum()) == is_darker and np.abs(veiled - bare).max() > 15
+    assert veiled[2] > veiled[0] + 15  # the blue of the shape is seen through it
+    np.testing.assert_array_equal(after[inside(views, SCAN)], before[inside(views, SCAN)])
+    canvas = rgb(theme.canvas)
+    shape = inside(views, FULL_SHAPE)
+    assert (after[shape] == canvas).all(axis=2).sum() < (before[shape] == canvas).all(axis=2).sum() - 500
+    views.show_ghost(None)
+    np.testing.assert_array_equal(pixels(views), before)
+
+
+def test_a_ghost_inside_the_shape_is_hidden(views):
+    before = pixels(views)
+    views.show_ghost(*ghost_of(views, 0.8))
+    np.testing.assert_array_equal(pixels(views), before)
+
+
+def test_a_ghost_stays_where_it_is_while_the_shape_moves(views):
+    views.show_ghost(*ghost_of(views, 1.1))
+    before = pixels(views)
+    start = of(views, FULL_SHAPE)
+    for step in (3.0, 6.0):
+        views.show_surface(moved(start, step))
+        QTest.qWait(20)
+        assert (pixels(views) != before).any()
+    views.show_surface(start)
+    np.testing.assert_array_equal(pixels(views), before)
+
+
+def test_a_ghost_is_framed_with_the_shapes(views):
+    alone = views._canvas.box_mm()
+    views.show_ghost(*ghost_of(views, 1.5))
+    np.testing.assert_allclose(views._canvas.box_mm(), 1.5 * alone, atol=0.1)
+    views.show_panels((SCAN, CERTAINTY))
+    np.testing.assert_allclose(views._canvas.box_mm(), alone, atol=0.1)
+
+
+def test_a_ghost_of_points_is_dotted(views):
+    before = pixels(views)
+    views.show_ghost(ghost_of(views, 1.2)[0])
+    changed = (pixels(views) != before).any(axis=2)
+    surface = (before[inside(views, FULL_SHAPE)] != rgb(LIGHT.canvas)).any(axis=2).sum()
+    assert 100 < changed[inside(views, FULL_SHAPE)].sum() < 0.6 * surface
+    assert changed.sum() == changed[inside(views, FULL_SHAPE)].sum()
+
+
+def test_a_new_atlas_has_no_ghost(views, card):
+    views.show_ghost(*ghost_of(views, 1.1))
+    views.show_atlas(card, LIGHT)
+    assert views._canvas._plots[views._index(FULL_SHAPE)].ghost is None
+
+
+def cloud(view: sv.ShapeView, values_mm=None) -> SurfaceResult:
+    result = of(view, SCAN, values_mm)
+    return replace(result, faces=result.faces[:0], normals=np.zeros_like(result.normals))
+
+
+def test_a_cloud_is_drawn_as_points(views):
+    whole = (pixels(views)[inside(views, SCAN)] != rgb(LIGHT.canvas)).any(axis=2).sum()
+    views.show_surface(cloud(views))
+    dots = pixels(views)[inside(views, SCAN)]
+    is_dot = (dots != rgb(LIGHT.canvas)).any(axis=2)
+    assert 300 < is_dot.sum() < whole
+    assert abs(QColor(*map(int, np.median(dots[is_dot], axis=0))).hue() - QColor(SCAN_COLOUR).hue()) < 20
+    views.show_surface(cloud(views, 2.0))
+    coloured = pixels(views)[inside(views, SCAN)]
+    reds = coloured[(coloured != rgb(LIGHT.canvas)).any(axis=2)]
+    assert (reds[:, 0].astype(int) - reds[:, 2] > 60).mean() > 0.5
+    views.show_surface(of(views, SCAN))
+    assert (pixels(views)[inside(views, SCAN)] != rgb(LIGHT.canvas)).any(axis=2).sum() == whole
