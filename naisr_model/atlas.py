@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -41,6 +40,7 @@ from naisr_model.learning.fitting.search import ShapeFit, draw_sample, fit_shape
 from naisr_model.learning.fitting.target import target_of
 from naisr_model.models.devices import usable_device
 from naisr_model.models.naisr.network import Naisr
+from naisr_model.progress import SILENT, Progress
 from naisr_model.surface.displacements import Displacements, DisplacementTables, tabulate
 from naisr_model.surface.fields import distances, effect_field, shape_field, template_field
 from naisr_model.surface.isosurface import isosurface
@@ -48,9 +48,6 @@ from naisr_model.surface.lattice import Lattice
 from naisr_model.surface.sparse import CHUNK, COARSEST, Field, evaluate_band
 from naisr_model.surface.tracking import CodeTracker, FadingTracker, Tracker, make_tracker
 from naisr_model.surface.volume import enclosed_volume
-
-Progress = Callable[[float], None]
-StopCheck = Callable[[], bool]
 
 VOLUME_RESOLUTION = 128
 CHECK_SAMPLE = 2000
@@ -77,8 +74,8 @@ class Atlas:
     the population centre. ``latent`` is a code z ``[L]``; left out, it is 0, the population
     average. Surfaces are ``trimesh.Trimesh`` in millimetres with outward faces, so their
     ``volume / 1000`` is in cm3; where no surface exists they have no faces. ``resolution`` is the
-    number of cells along a side of the box, a multiple of 8. A ``should_stop`` that turns true ends
-    a computation with :class:`~naisr_model.errors.Cancelled`.
+    number of cells along a side of the box, a multiple of 8. ``progress`` is told the finished share, and
+    ends a computation that nobody waits for any more with :class:`~naisr_model.errors.Cancelled`.
 
     Inference has no randomness: the same question has the same answer.
 
@@ -171,8 +168,7 @@ class Atlas:
         *,
         extrapolate: bool = False,
         tracker: Tracker | None = None,
-        progress: Progress | None = None,
-        should_stop: StopCheck | None = None,
+        progress: Progress = SILENT,
     ) -> trimesh.Trimesh:
         """The full shape, the zero level set of Phi(p, c, z) = T(p + sum_i g_i(p, c_i, z)).
 
@@ -180,11 +176,11 @@ class Atlas:
 
         Raises:
             InputError: for an unknown covariate or one out of range (unless ``extrapolate``).
-            Cancelled: when ``should_stop()`` turned true.
+            Cancelled: when nobody waits for it any more.
         """
         field = shape_field(self._network, self._vector(covariates, extrapolate), self._latent(latent))
         guess = None if tracker is None else tracker.guess(covariates)
-        return self._surface(field, resolution, progress, should_stop, guess)
+        return self._surface(field, resolution, progress, guess)
 
     def effect(
         self,
@@ -195,8 +191,7 @@ class Atlas:
         *,
         extrapolate: bool = False,
         tracker: Tracker | None = None,
-        progress: Progress | None = None,
-        should_stop: StopCheck | None = None,
+        progress: Progress = SILENT,
     ) -> trimesh.Trimesh:
         """The disentangled shape of one covariate, Phi_i(p, c_i, z) = T(p + g_i(p, c_i, z)).
 
@@ -205,51 +200,48 @@ class Atlas:
 
         Raises:
             InputError: for an unknown covariate or one out of range (unless ``extrapolate``).
-            Cancelled: when ``should_stop()`` turned true.
+            Cancelled: when nobody waits for it any more.
         """
         vector = self._vector({name: value}, extrapolate)
         index = self.population.names.index(name)
         field = effect_field(self._network, index, vector, self._latent(latent))
         guess = None if tracker is None else tracker.guess({name: value})
-        return self._surface(field, resolution, progress, should_stop, guess)
+        return self._surface(field, resolution, progress, guess)
 
     def template(
         self,
         resolution: int = 128,
         *,
-        progress: Progress | None = None,
-        should_stop: StopCheck | None = None,
+        progress: Progress = SILENT,
     ) -> trimesh.Trimesh:
         """The template, the zero level set of T: the shape at the population centre.
 
         Raises:
-            Cancelled: when ``should_stop()`` turned true.
+            Cancelled: when nobody waits for it any more.
         """
-        return self._surface(template_field(self._network), resolution, progress, should_stop)
+        return self._surface(template_field(self._network), resolution, progress)
 
     def tabulate(
         self,
         template: trimesh.Trimesh,
         latent: ArrayLike | None = None,
         *,
-        progress: Progress | None = None,
-        should_stop: StopCheck | None = None,
+        progress: Progress = SILENT,
     ) -> DisplacementTables:
         """The displacements of one code on a lattice, what :meth:`tracker` needs; takes seconds.
 
         Args:
             template: a mesh that :meth:`template` gave.
             latent: code z ``[L]``.
-            progress: told the finished share.
-            should_stop: polled between chunks of points.
+            progress: told the finished share, checked between chunks of points.
 
         Raises:
-            Cancelled: when ``should_stop()`` turned true.
+            Cancelled: when nobody waits for it any more.
         """
         ranges = [(float(low), float(high)) for low, high in (c.normalise(c.range) for c in self.covariates)]
         bounds = self.frame.to_model(template.bounds)
         code = self._latent(latent)
-        return tabulate(self._network, ranges, code, bounds, progress=progress, should_stop=should_stop)
+        return tabulate(self._network, ranges, code, bounds, progress=progress)
 
     def tracker(self, template: trimesh.Trimesh, tables: DisplacementTables) -> CodeTracker:
         """What carries ``template`` to any covariates in milliseconds, vertex by vertex.
@@ -267,20 +259,18 @@ class Atlas:
         shape: trimesh.Trimesh | ArrayLike,
         known: Values | None = None,
         *,
-        progress: Progress | None = None,
-        should_stop: StopCheck | None = None,
+        progress: Progress = SILENT,
     ) -> Fit:
         """The code and the unknown covariates that explain a patient's shape best, and how sure they are.
 
         Args:
             shape: a mesh, watertight or open, or points ``[n, 3]``; millimetres of the atlas frame.
             known: covariate values in real units; those left out are inferred.
-            progress: told the finished share.
-            should_stop: polled between steps.
+            progress: told the finished share, checked between steps.
 
         Raises:
             InputError: for an unknown covariate or one out of range, or a shape that has too few points.
-            Cancelled: when ``should_stop()`` turned true.
+            Cancelled: when nobody waits for it any more.
         """
         started = time.perf_counter()
         known = dict(known or {})
@@ -293,9 +283,7 @@ class Atlas:
         network = self._cpu_network
         # Threads of NumPy's linear algebra spin when it is torch's turn: on two cores twice the time.
         with threadpool_limits(1, user_api="blas"):
-            fits = fit_shape(
-                network, target, self._prior, vector, binary, progress=progress, should_stop=should_stop
-            )
+            fits = fit_shape(network, target, self._prior, vector, binary, progress=progress)
             posterior = posterior_of(network, target, self._prior, fits[0])
         check = draw_sample(target, POINTS, CHECK_SAMPLE).points[:POINTS].numpy()
         found, code = network.tensor(fits[0].covariates), network.tensor(fits[0].latent)
@@ -333,8 +321,7 @@ class Atlas:
         self,
         field: Field,
         resolution: int,
-        progress: Progress | None,
-        should_stop: StopCheck | None,
+        progress: Progress,
         guess: Field | None = None,
     ) -> trimesh.Trimesh:
         if self.frame.dim != 3:
@@ -344,7 +331,7 @@ class Atlas:
                 f"resolution is {resolution}; give a multiple of {COARSEST} from {2 * COARSEST} on"
             )
         lattice = Lattice(resolution)
-        return isosurface(evaluate_band(field, lattice, progress, should_stop, guess), lattice, self.frame)
+        return isosurface(evaluate_band(field, lattice, progress, guess), lattice, self.frame)
 
 
 @dataclass(frozen=True, eq=False)
@@ -375,13 +362,12 @@ class Individual:
         self,
         resolution: int = VOLUME_RESOLUTION,
         *,
-        progress: Progress | None = None,
-        should_stop: StopCheck | None = None,
+        progress: Progress = SILENT,
     ) -> trimesh.Trimesh:
         """The full shape in millimetres.
 
         Raises:
-            Cancelled: when ``should_stop()`` turned true.
+            Cancelled: when nobody waits for it any more.
         """
         return self.atlas.shape(
             self.covariates,
@@ -389,7 +375,6 @@ class Individual:
             resolution,
             extrapolate=True,
             progress=progress,
-            should_stop=should_stop,
         )
 
     def elsewhere(self, vector: NDArray[np.float64]) -> Individual:
@@ -405,25 +390,20 @@ class Individual:
         self,
         template: trimesh.Trimesh,
         *,
-        progress: Progress | None = None,
-        should_stop: StopCheck | None = None,
+        progress: Progress = SILENT,
     ) -> FadingTracker:
         """What carries a template to this person :meth:`elsewhere` in milliseconds; takes seconds.
 
         Args:
             template: a mesh that :meth:`Atlas.template` gave.
-            progress: told the finished share.
-            should_stop: polled between chunks of points.
+            progress: told the finished share, checked between chunks of points.
 
         Raises:
-            Cancelled: when ``should_stop()`` turned true.
+            Cancelled: when nobody waits for it any more.
         """
         atlas, lasting = self.atlas, self.posterior.problem.prior.lasting
         codes = (lasting * self.latent, self.latent)
-        far, near = (
-            atlas.tabulate(template, code, progress=_half(progress, number), should_stop=should_stop)
-            for number, code in enumerate(codes)
-        )
+        far, near = (atlas.tabulate(template, code, progress=piece) for code, piece in progress.over(codes))
         tracker = atlas.tracker(template, far)
 
         def nearness_of(values: Values) -> float:
@@ -606,8 +586,3 @@ class Fit:
         ends = np.interp([TAIL, 1 - TAIL], np.cumsum(self._shares @ densities), places)
         low, high = covariate.restore(ends).tolist()
         return low, high
-
-
-def _half(progress: Progress | None, number: int) -> Progress | None:
-    """Progress of the first or the second of two pieces as progress of both."""
-    return None if progress is None else lambda share: progress((number + share) / 2)

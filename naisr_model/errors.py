@@ -9,4 +9,4 @@ class InputError(ValueError):
 
 
 class Cancelled(Exception):
-    """Raised inside a long computation when the caller's ``should_stop()`` turned true."""
+    """Raised inside a long computation that nobody waits for any more, see ``Progress.check``."""

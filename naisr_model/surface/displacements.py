@@ -20,10 +20,11 @@ from scipy.interpolate import CubicSpline
 from torch import Tensor
 from torch.nn import functional
 
-from naisr_model.errors import Cancelled, InputError
+from naisr_model.errors import InputError
 from naisr_model.files import replacing
 from naisr_model.models.naisr.inference import PointFunction, effect_function
 from naisr_model.models.naisr.network import Naisr
+from naisr_model.progress import SILENT, Progress
 
 SPACINGS = (1 / 8, 1 / 16, 1 / 32)
 """Distances between tabulated nodes that are tried, in model units. The last is also the spacing of the
@@ -43,7 +44,7 @@ SURVEY = 1 / 6
 """Spacing of the lattice on which the region is found that shapes can reach."""
 
 CHUNK = 4096
-"""Evaluations between two looks at ``should_stop``."""
+"""Evaluations between two looks at whether anybody waits for them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,8 +112,7 @@ def tabulate(
     latent: Tensor,
     bounds: NDArray[np.float64],
     *,
-    progress: Callable[[float], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
+    progress: Progress = SILENT,
 ) -> DisplacementTables:
     """Tabulate every g_i of a code.
 
@@ -121,20 +121,16 @@ def tabulate(
         ranges: lowest and highest centred value of each covariate.
         latent: the code z, ``[L]``.
         bounds: lower and upper corner of the template's surface in model units, ``[2, 3]``.
-        progress: told the finished share.
-        should_stop: polled between chunks of points.
+        progress: told the finished share, checked between chunks of points.
 
     Raises:
-        Cancelled: when ``should_stop()`` turned true.
+        Cancelled: when nobody waits for it any more.
     """
-    fields = [_field(network, index, latent, should_stop) for index in range(len(ranges))]
+    fields = [_field(network, index, latent, progress) for index in range(len(ranges))]
     region = _reachable(fields, ranges, bounds)
-    tables = []
-    for field, limits in zip(fields, ranges, strict=True):
-        tables.append(_tabulated(field, limits, region))
-        if progress is not None:
-            progress(len(tables) / len(fields))
-    return DisplacementTables(region, tuple(tables))
+    jobs = list(zip(fields, ranges, strict=True))
+    tables = tuple(_tabulated(*job, region) for job, _ in progress.over(jobs))
+    return DisplacementTables(region, tables)
 
 
 class Displacements:
@@ -201,7 +197,7 @@ _Values = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float3
 """Points ``[n, 3]`` and centred values ``[K]`` of one covariate to displacements ``[K, 3, n]``."""
 
 
-def _field(network: Naisr, index: int, latent: Tensor, should_stop: Callable[[], bool] | None) -> _Values:
+def _field(network: Naisr, index: int, latent: Tensor, progress: Progress) -> _Values:
     """g_i of the covariate ``index`` at one code."""
 
     def field(points: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -211,8 +207,7 @@ def _field(network: Naisr, index: int, latent: Tensor, should_stop: Callable[[],
         return np.concatenate([chunk(effect, piece) for piece in pieces], axis=-1)
 
     def chunk(effect: PointFunction, points: Tensor) -> NDArray[np.float32]:
-        if should_stop is not None and should_stop():
-            raise Cancelled
+        progress.check()
         return effect(points).mT.numpy(force=True)
 
     return field

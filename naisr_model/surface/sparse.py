@@ -23,7 +23,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from naisr_model.errors import Cancelled
+from naisr_model.progress import SILENT, Progress
 from naisr_model.surface.lattice import Lattice
 
 Field = Callable[[NDArray[np.float32]], NDArray[np.float32]]
@@ -55,26 +55,17 @@ MARKED_AT_ONCE = 1_000_000
 """Nodes; bounds the memory that marking the inside takes."""
 
 CHUNK = 4096
-"""Points evaluated between two looks at ``should_stop``."""
+"""Points evaluated between two looks at whether anybody waits for them."""
 
 
-def evaluate_everywhere(
-    field: Field,
-    lattice: Lattice,
-    progress: Callable[[float], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
-) -> NDArray[np.float32]:
+def evaluate_everywhere(field: Field, lattice: Lattice, progress: Progress = SILENT) -> NDArray[np.float32]:
     """The field at every node, shape ``lattice.shape``: the reference for :func:`evaluate_band`."""
-    values = _chunked(field, lattice.points(lattice.nodes()), progress, should_stop)
+    values = _chunked(field, lattice.points(lattice.nodes()), progress)
     return values.reshape(lattice.shape)
 
 
 def evaluate_band(
-    field: Field,
-    lattice: Lattice,
-    progress: Callable[[float], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
-    guess: Field | None = None,
+    field: Field, lattice: Lattice, progress: Progress = SILENT, guess: Field | None = None
 ) -> NDArray[np.float32]:
     """The field at both ends of all edges that its zero level set crosses, and its sign elsewhere.
 
@@ -83,18 +74,17 @@ def evaluate_band(
     Args:
         field: the signed distance.
         lattice: ``lattice.resolution`` must be a multiple of :data:`COARSEST`.
-        progress: told the finished share.
-        should_stop: polled between chunks.
+        progress: told the finished share, checked between chunks.
         guess: about the same, and much cheaper. It saves evaluations; one that proves wrong is put aside.
 
     Returns:
         Shape ``lattice.shape``.
 
     Raises:
-        Cancelled: when ``should_stop()`` turned true.
+        Cancelled: when nobody waits for it any more.
     """
-    band = _Band(field, lattice, _Meter(progress), should_stop)
-    if guess is None or not _settle(band, _Band(guess, lattice, _Meter(None), should_stop)):
+    band = _Band(field, lattice, _Meter(progress))
+    if guess is None or not _settle(band, _Band(guess, lattice, _Meter(progress.quiet))):
         _search(band, LEAST_SLACK)
     band.meter.tell(1.0)
     return band.values
@@ -103,13 +93,16 @@ def evaluate_band(
 class _Meter:
     """Passes on a share that never falls, though a repeated walk starts again."""
 
-    def __init__(self, progress: Callable[[float], None] | None) -> None:
+    def __init__(self, progress: Progress) -> None:
         self.progress, self.share = progress, 0.0
 
     def tell(self, share: float) -> None:
         self.share = max(self.share, share)
-        if self.progress is not None:
-            self.progress(self.share)
+        self.progress.tell(self.share)
+
+    def towards(self, end: float) -> Progress:
+        """That of a piece which takes the share from where it is to ``end``."""
+        return Progress(self.tell, self.progress.is_unwanted, self.share, end - self.share)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +112,6 @@ class _Band:
     field: Field
     lattice: Lattice
     meter: _Meter
-    should_stop: Callable[[], bool] | None
 
     @cached_property
     def values(self) -> NDArray[np.float32]:
@@ -158,13 +150,8 @@ class _Band:
 
     def evaluate(self, places: NDArray[np.intp], end: float) -> None:
         """Evaluate the nodes at these places in the row; the meter is at ``end`` afterwards."""
-        begin = self.meter.share
-        self.flat[places] = _chunked(
-            self.field,
-            self.lattice.points(self.nodes(places)),
-            lambda share: self.meter.tell(begin + (end - begin) * share),
-            self.should_stop,
-        )
+        points = self.lattice.points(self.nodes(places))
+        self.flat[places] = _chunked(self.field, points, self.meter.towards(end))
 
     def sink(self, blocks: Cells, size: int) -> None:
         """Mark what is not known of these blocks of ``size`` as inside."""
@@ -383,17 +370,8 @@ def _halves(dim: int) -> NDArray[np.intp]:
     return (corners[:, None] + corners) @ (3 ** np.arange(dim)[::-1])
 
 
-def _chunked(
-    field: Field,
-    points: NDArray[np.float32],
-    progress: Callable[[float], None] | None,
-    should_stop: Callable[[], bool] | None,
-) -> NDArray[np.float32]:
+def _chunked(field: Field, points: NDArray[np.float32], progress: Progress) -> NDArray[np.float32]:
     values = np.empty(len(points), np.float32)
-    for start in range(0, len(points), CHUNK):
-        if should_stop is not None and should_stop():
-            raise Cancelled
+    for start, _ in progress.over(range(0, len(points), CHUNK)):
         values[start : start + CHUNK] = field(points[start : start + CHUNK])
-        if progress is not None:
-            progress(min(1.0, (start + CHUNK) / len(points)))
     return values

@@ -6,6 +6,7 @@ import trimesh
 
 from naisr_model.atlas import Atlas
 from naisr_model.errors import Cancelled, InputError
+from naisr_model.progress import Progress
 
 
 @pytest.fixture(scope="module")
@@ -62,4 +63,4 @@ def test_extrapolation_is_there_for_those_who_ask(atlas):
 
 def test_cancelling(atlas):
     with pytest.raises(Cancelled):
-        atlas.shape({}, should_stop=lambda: True)
+        atlas.shape({}, progress=Progress(is_unwanted=lambda: True))

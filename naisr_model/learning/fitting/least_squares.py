@@ -12,7 +12,6 @@ and that is alike over centimetres of a surface however many points are taken fr
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -21,13 +20,12 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from naisr_model.errors import Cancelled
 from naisr_model.learning.fitting.prior import Prior, conditional
 from naisr_model.learning.fitting.sensitivity import sensitivity
 from naisr_model.models.naisr.network import Naisr
+from naisr_model.progress import SILENT, Progress
 
 Vector = NDArray[np.float64]
-StopCheck = Callable[[], bool]
 
 TOLERATED = 4.0
 """k in standard deviations: residuals far beyond it lose their say (Geman-McClure)."""
@@ -180,21 +178,21 @@ class Descent:
 
 
 def descend(
-    problem: Problem, sample: Sample, parameters: Vector, steps: int, should_stop: StopCheck | None
+    problem: Problem, sample: Sample, parameters: Vector, steps: int, progress: Progress = SILENT
 ) -> Descent:
     """At most ``steps`` Levenberg-Marquardt steps on one sample; never worse than the start.
 
-    The noise is that of the residuals at the start, so it falls from one descent to the next.
+    The noise is that of the residuals at the start, so it falls from one descent to the next. ``progress``
+    is checked before each step; how many there will be nobody can tell.
 
     Raises:
-        Cancelled: when ``should_stop()`` turned true.
+        Cancelled: when nobody waits for it any more.
     """
     rows, damping, tried, moved = evaluate(problem, sample, parameters), FIRST_DAMPING, 0, False
     noise = rows.noise
     here = linearise(problem, rows, parameters, noise)
     while tried < steps:
-        if should_stop is not None and should_stop():
-            raise Cancelled
+        progress.check()
         trial = problem.bounded(parameters + _step(problem, parameters, here, damping))
         trial_rows = evaluate(problem, sample, trial)
         there = linearise(problem, trial_rows, trial, noise)

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from naisr_model.config import FitConfig, LossWeights
-from naisr_model.errors import Cancelled
 from naisr_model.learning.fitting.least_squares import (
     TOLERATED,
     Descent,
@@ -32,10 +31,9 @@ from naisr_model.learning.fitting.prior import Prior, Told, believed
 from naisr_model.learning.fitting.target import Target
 from naisr_model.learning.training.objective import Batch, latent_term, reconstruction_terms
 from naisr_model.models.naisr.network import Naisr
+from naisr_model.progress import SILENT, Progress
 
 Vector = NDArray[np.float64]
-Progress = Callable[[float], None]
-StopCheck = Callable[[], bool]
 
 STAGES, MOST_STEPS = (256, 512, 768), 4
 """Surface points of each stage, freshly drawn and from coarse to fine, and its most steps."""
@@ -88,8 +86,7 @@ def fit_latents(
     config: FitConfig,
     weights: LossWeights,
     *,
-    progress: Callable[[float], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
+    progress: Progress = SILENT,
 ) -> Tensor:
     """The codes z that minimise the training loss at known covariates, by Adam from z = 0.
 
@@ -101,14 +98,13 @@ def fit_latents(
         covariates: centred, ``[shapes, N]``.
         config: steps, rate and seed.
         weights: of the loss terms.
-        progress: told the finished share after every step.
-        should_stop: polled before every step.
+        progress: told the finished share after every step, checked before each.
 
     Returns:
         ``[shapes, L]``.
 
     Raises:
-        Cancelled: when ``should_stop()`` turned true.
+        Cancelled: when nobody waits for it any more.
     """
     latents = covariates.new_zeros(len(covariates), network.config.latent).requires_grad_()
     optimiser = torch.optim.Adam([latents], lr=config.rate)
@@ -117,9 +113,7 @@ def fit_latents(
     for parameter in frozen:
         parameter.requires_grad_(False)
     try:
-        for step in range(config.steps):
-            if should_stop is not None and should_stop():
-                raise Cancelled
+        for step, _ in progress.over(range(config.steps)):
             batch = draw(np.random.default_rng([config.seed, step]))
             optimiser.zero_grad()
             # Means over the shapes; multiplying by their number makes each fit its own problem.
@@ -128,8 +122,6 @@ def fit_latents(
             (len(latents) * torch.stack(list(terms.values())).sum()).backward()
             optimiser.step()
             schedule.step()
-            if progress is not None:
-                progress((step + 1) / config.steps)
     finally:
         for parameter in frozen:
             parameter.requires_grad_(True)
@@ -168,8 +160,7 @@ def fit_shape(
     known: Vector,
     binary: Sequence[int] = (),
     *,
-    progress: Progress | None = None,
-    should_stop: StopCheck | None = None,
+    progress: Progress = SILENT,
 ) -> list[ShapeFit]:
     """The most probable code and unknown covariates of a shape, the maximum of p(c, z | points).
 
@@ -182,32 +173,31 @@ def fit_shape(
         prior: of the training population.
         known: centred covariates, NaN where unknown, ``[N]``.
         binary: columns that only ever are -1 or +1.
-        progress: told the finished share.
-        should_stop: polled before every step.
+        progress: told the finished share, checked before every step.
 
     Returns:
         A fit for each explanation that differs in its covariates, the best first.
 
     Raises:
-        Cancelled: when ``should_stop()`` turned true.
+        Cancelled: when nobody waits for it any more.
     """
     samples = [draw_sample(target, points, stage) for stage, points in enumerate(STAGES)]
     if not np.isnan(known).any():
         problem = Problem(network, prior, known, FOLLOWED_POINTS)
         problems = [dataclasses.replace(problem, tolerated=tolerated) for tolerated in DRAWN_IN]
-        descent = _descend(problems, samples, np.zeros(len(prior.code_root)), should_stop, progress)
+        descent = _descend(problems, samples, np.zeros(len(prior.code_root)), progress)
         return [_result(problem, descent, descent.rows.noise, samples[0])]
-    begun = _begun(network, target, prior, _combinations(known, binary), should_stop, progress)
+    begun = _begun(network, target, prior, _combinations(known, binary), progress.part(0, 1 / 3))
     settled: list[Explanation] = []
     pursued = _different(begun)
-    for number, (followed, descent) in enumerate(pursued):
-        problem, told = _weighed(followed), _part(progress, len(pursued) + number, 3 * len(pursued))
-        settled.append((problem, _descend([problem] * 2, samples[1:], descent.parameters, should_stop, told)))
+    for (followed, descent), piece in progress.part(1 / 3, 2 / 3).over(pursued):
+        problem = _weighed(followed)
+        settled.append((problem, _descend([problem] * 2, samples[1:], descent.parameters, piece)))
     noise = min(descent.rows.noise for _, descent in settled)
     fits = sorted(
         (_result(*one, noise, samples[0]) for one in _different(settled)), key=lambda fit: fit.surprise
     )
-    best = _followed(network, prior, fits[0], samples[-1], should_stop, _part(progress, 2, 3))
+    best = _followed(network, prior, fits[0], samples[-1], progress.part(2 / 3, 1))
     asked = len(fits) * (1 + len(SHARES) * len(fits[0].free)) * len(samples[0].points)
     spent = sum(descent.evaluations for _, descent in begun + settled) + best.evaluations + asked
     return [dataclasses.replace(best, evaluations=spent), *fits[1:]]
@@ -218,22 +208,19 @@ def _begun(
     target: Target,
     prior: Prior,
     combinations: Sequence[Vector],
-    should_stop: StopCheck | None,
-    progress: Progress | None,
+    progress: Progress,
 ) -> list[Explanation]:
     """Where descents on the coarsest sample lead from the best places of each combination.
 
     They follow the surface closely: with a say as small as that of the inference a bad start would pass
-    its own residuals off as noise. A third of the work.
+    its own residuals off as noise.
     """
     placing, coarse = draw_sample(target, PLACING_POINTS, 0), draw_sample(target, STAGES[0], 0)
     found: list[Explanation] = []
-    for number, fixed in enumerate(combinations, start=1):
+    for fixed, piece in progress.over(combinations):
         problem = Problem(network, prior, fixed, FOLLOWED_POINTS)
         for start in _starts(problem, placing):
-            found.append((problem, _descend([problem], [coarse], start, should_stop, None)))
-        if progress is not None:
-            progress(number / (3 * len(combinations)))
+            found.append((problem, _descend([problem], [coarse], start, piece.quiet)))
     return found
 
 
@@ -267,18 +254,15 @@ def _descend(
     problems: Sequence[Problem],
     samples: Sequence[Sample],
     parameters: Vector,
-    should_stop: StopCheck | None,
-    progress: Progress | None,
+    progress: Progress,
 ) -> Descent:
     """From sample to sample, each with its problem; what is told as evaluations counts all of them."""
     spent = 0
-    for done, (problem, sample) in enumerate(zip(problems, samples, strict=True), start=1):
-        descent = descend(problem, sample, parameters, MOST_STEPS, should_stop)
+    for (problem, sample), _ in progress.over(list(zip(problems, samples, strict=True))):
+        descent = descend(problem, sample, parameters, MOST_STEPS, progress)
         if descent.stalled:
-            descent = _rescued(problem, sample, descent, should_stop)
+            descent = _rescued(problem, sample, descent, progress)
         parameters, spent = descent.parameters, spent + descent.evaluations
-        if progress is not None:
-            progress(done / len(samples))
     return dataclasses.replace(descent, evaluations=spent)
 
 
@@ -351,19 +335,14 @@ def _followed(
     prior: Prior,
     fit: ShapeFit,
     sample: Sample,
-    should_stop: StopCheck | None,
-    progress: Progress | None,
+    progress: Progress,
 ) -> ShapeFit:
     """The code moved closer to the surface, the covariates staying where they were inferred."""
     problem = Problem(network, prior, fit.covariates, FOLLOWED_POINTS)
     start = problem.pack(fit.covariates, fit.latent)
-    descent = _descend([problem], [sample], start, should_stop, progress)
+    descent = _descend([problem], [sample], start, progress)
     latent = problem.unpack(descent.parameters)[1]
     return dataclasses.replace(fit, latent=latent, noise=descent.rows.noise, evaluations=descent.evaluations)
-
-
-def _part(progress: Progress | None, number: int, parts: int) -> Progress | None:
-    return None if progress is None else lambda share: progress((number + share) / parts)
 
 
 def draw_sample(target: Target, points: int, seed: int) -> Sample:
@@ -412,19 +391,18 @@ def _places(problem: Problem) -> list[Vector]:
     return list(rows[chosen])
 
 
-def _rescued(problem: Problem, sample: Sample, descent: Descent, should_stop: StopCheck | None) -> Descent:
+def _rescued(problem: Problem, sample: Sample, descent: Descent, progress: Progress) -> Descent:
     """Adam where no damped step would go down, then least squares again; the better of the two ends."""
     parameters, noise = descent.parameters, descent.rows.noise
     first, second = np.zeros_like(parameters), np.zeros_like(parameters)
     for step in range(1, RESCUE_STEPS + 1):
-        if should_stop is not None and should_stop():
-            raise Cancelled
+        progress.check()
         rows = evaluate(problem, sample, parameters)
         gradient = linearise(problem, rows, parameters, noise).gradient
         first, second = 0.9 * first + 0.1 * gradient, 0.99 * second + 0.01 * gradient**2
         ratio = first / (1 - 0.9**step) / (np.sqrt(second / (1 - 0.99**step)) + 1e-12)
         parameters = problem.bounded(parameters - RESCUE_RATE * (1 - step / (RESCUE_STEPS + 1)) * ratio)
-    again = descend(problem, sample, parameters, MOST_STEPS, should_stop)
+    again = descend(problem, sample, parameters, MOST_STEPS, progress)
     before, after = (
         linearise(problem, end.rows, end.parameters, noise).objective for end in (descent, again)
     )

@@ -30,6 +30,7 @@ from naisr_model.learning.training.objective import Batch, latent_term, populati
 from naisr_model.learning.training.residual import covariate_basis
 from naisr_model.models.devices import usable_device
 from naisr_model.models.naisr.network import Naisr
+from naisr_model.progress import SILENT, Progress
 from naisr_model.surface.fields import template_field
 from naisr_model.surface.folding import folded_shares
 from naisr_model.surface.isosurface import isosurface
@@ -160,7 +161,7 @@ def train(
     *,
     time_budget_s: float = math.inf,
     report: Callable[[Report], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
+    progress: Progress = SILENT,
     device: str = "cpu",
 ) -> Checkpoint:
     """Train an atlas on the store's training rows and write it to ``out``.
@@ -175,7 +176,7 @@ def train(
         time_budget_s: ends the training after so many seconds, earlier stops included; the learning
             rates then follow the clock, so only a training without it gives the same result twice.
         report: called after every iteration.
-        should_stop: polled once an iteration.
+        progress: told the finished share, checked once an iteration.
         device: where torch computes.
 
     Returns:
@@ -184,7 +185,7 @@ def train(
     Raises:
         InputError: when settings and data do not fit, or when the loss becomes NaN or breaks away; the
             last good state is kept.
-        Cancelled: when ``should_stop()`` turned true; the state reached is kept.
+        Cancelled: when nobody waits for it any more; the state reached is kept.
     """
     task = _task(store, preset, out, time_budget_s, device)
     state = _initial_state(preset, len(task.rows), len(store.population.covariates), device)
@@ -196,11 +197,11 @@ def train(
             losses = _accumulate_gradients(state, task)
             _judge(losses["total"], state, task)
             # Only weights whose loss was just found sound are ever written.
-            stopped = should_stop is not None and should_stop()
-            if stopped or started - saved > SAVE_SECONDS:
+            is_unwanted = progress.is_unwanted()
+            if is_unwanted or started - saved > SAVE_SECONDS:
                 _save(state, task)
                 saved = time.monotonic()
-            if stopped:
+            if is_unwanted:
                 raise Cancelled
             state.optimiser.step()
             state.iteration += 1
@@ -208,6 +209,7 @@ def train(
             state.seconds += time.monotonic() - started
             told = _report(state, task, losses, (time.monotonic() - began) / (state.iteration - first))
             log.add(told)
+            progress.tell(min(1.0, told.share))
             if report is not None:
                 report(told)
     _save(state, task)

@@ -14,6 +14,7 @@ from naisr_model.checkpoint import load
 from naisr_model.covariates import normalised_vector
 from naisr_model.errors import Cancelled
 from naisr_model.frames import Frame
+from naisr_model.progress import SILENT, Progress
 from naisr_model.surface import sparse
 from naisr_model.surface.fields import shape_field
 from naisr_model.surface.isosurface import isosurface
@@ -299,7 +300,7 @@ def test_between_evaluated_nodes_a_field_is_continued():
 
 def test_the_surface_is_followed_out_of_what_was_evaluated():
     lattice = Lattice(32)
-    band = sparse._Band(sphere, lattice, sparse._Meter(None), None)
+    band = sparse._Band(sphere, lattice, sparse._Meter(SILENT))
     seed = np.array([[25, 16, 16]])  # (0.6, 0, 0) is on the sphere
     band.open(seed, 1)
     sparse._follow(band, seed)
@@ -317,9 +318,9 @@ def test_no_surface_is_an_empty_mesh():
 
 def test_cancel_is_polled_and_progress_ends_at_one():
     with pytest.raises(Cancelled):
-        evaluate_band(sphere, Lattice(64), should_stop=lambda: True)
+        evaluate_band(sphere, Lattice(64), Progress(is_unwanted=lambda: True))
     told: list[float] = []
-    evaluate_band(sphere, Lattice(64), progress=told.append)
+    evaluate_band(sphere, Lattice(64), Progress(told.append))
     assert told[-1] == 1 and told == sorted(told)
 
 

@@ -14,6 +14,7 @@ from naisr_model.atlas import Atlas
 from naisr_model.errors import Cancelled, InputError
 from naisr_model.learning.fitting import prior
 from naisr_model.models.naisr.inference import displacement_function
+from naisr_model.progress import Progress
 from naisr_model.surface.displacements import SPACINGS, TOLERANCE, Displacements, DisplacementTables, sample
 from naisr_model.surface.fields import shape_field
 from naisr_model.surface.lattice import Lattice
@@ -171,7 +172,7 @@ def test_a_fitted_person_is_carried_elsewhere(atlas, template, monkeypatch):
     home, elsewhere = {"age": 6.5, "sex": 1.0}, {"age": 3.0, "sex": -1.0}
     fit = atlas.fit(atlas.shape(home, OUTSTANDING * atlas.checkpoint.latents[0], 64), home)
     told: list[float] = []
-    tracker = fit.individual.tracker(template, progress=told.append)
+    tracker = fit.individual.tracker(template, progress=Progress(told.append))
     assert told == sorted(told) and told[-1] == 1
     assert tracker.nearness(home) == 1 and tracker.nearness(elsewhere) < 0.01
     for values in (home, elsewhere):
@@ -225,5 +226,5 @@ def test_a_file_of_something_else_is_refused(tmp_path, content):
 def test_tabulating_can_be_cancelled_and_reports_progress(atlas, template):
     seen: list[float] = []
     with pytest.raises(Cancelled):
-        atlas.tabulate(template, progress=seen.append, should_stop=lambda: bool(seen))
+        atlas.tabulate(template, progress=Progress(seen.append, lambda: bool(seen)))
     assert len(seen) == 1

@@ -26,6 +26,7 @@ from naisr_model.learning.fitting.sensitivity import sensitivity
 from naisr_model.learning.fitting.target import target_of
 from naisr_model.models.naisr.network import Naisr
 from naisr_model.patients.evolution import along_only, evolution, write_series
+from naisr_model.progress import SILENT, Progress
 
 
 @pytest.fixture(scope="module")
@@ -123,7 +124,7 @@ def test_far_off_points_are_not_followed(atlas, made):
 def test_a_descent_never_goes_up_and_stays_in_range(lost):
     problem, sample, start = lost
     rows = evaluate(problem, sample, start)
-    end = descend(problem, sample, start, 6, None)
+    end = descend(problem, sample, start, 6)
     before = linearise(problem, rows, start, rows.noise).objective
     assert linearise(problem, end.rows, end.parameters, rows.noise).objective < before
     assert problem.prior.lowest[0] <= end.parameters[0] <= problem.prior.highest[0]
@@ -133,7 +134,7 @@ def test_a_descent_never_goes_up_and_stays_in_range(lost):
 def test_adam_helps_where_least_squares_stall(lost):
     problem, sample, start = lost
     rows = evaluate(problem, sample, start)
-    rescued = fitting._rescued(problem, sample, Descent(start, rows, 0, stalled=True), None)
+    rescued = fitting._rescued(problem, sample, Descent(start, rows, 0, stalled=True), SILENT)
     assert (
         linearise(problem, rescued.rows, rescued.parameters, rows.noise).objective
         < linearise(problem, rows, start, rows.noise).objective
@@ -224,9 +225,9 @@ def test_bad_patients_get_a_sentence(atlas):
 
 def test_cancelling_and_progress(atlas, made):
     with pytest.raises(Cancelled):
-        atlas.fit(made[2], should_stop=lambda: True)
+        atlas.fit(made[2], progress=Progress(is_unwanted=lambda: True))
     told: list[float] = []
-    atlas.fit(made[2], progress=told.append)
+    atlas.fit(made[2], progress=Progress(told.append))
     assert told == sorted(told) and told[-1] == pytest.approx(1)
 
 

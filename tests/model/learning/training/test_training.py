@@ -21,6 +21,7 @@ from naisr_model.learning.fitting.search import fit_latents
 from naisr_model.learning.training import loop as training
 from naisr_model.learning.training.loop import train
 from naisr_model.learning.training.objective import Batch
+from naisr_model.progress import Progress
 
 
 def test_the_effects_are_those_of_the_population(egg_atlas):
@@ -84,7 +85,9 @@ def test_a_stopped_training_keeps_what_it_reached(egg_store, tmp_path):
     out, preset = tmp_path / "stopped.safetensors", egg_preset(epochs=6)
     seen: list[training.Report] = []
     with pytest.raises(Cancelled):
-        train(egg_store, preset, out, report=seen.append, should_stop=lambda: len(seen) == 5)
+        train(
+            egg_store, preset, out, report=seen.append, progress=Progress(is_unwanted=lambda: len(seen) == 5)
+        )
     assert load(out).training["iterations"] == 5
     assert train(egg_store, preset, out, report=seen.append).training["iterations"] == 12
     assert [told.iteration for told in seen] == list(range(1, 13))
@@ -147,7 +150,12 @@ def test_a_time_budget_bounds_the_training_over_all_its_runs(egg_store, tmp_path
     seen: list[training.Report] = []
     with pytest.raises(Cancelled):
         train(
-            egg_store, preset, out, time_budget_s=1.0, report=seen.append, should_stop=lambda: len(seen) > 9
+            egg_store,
+            preset,
+            out,
+            time_budget_s=1.0,
+            report=seen.append,
+            progress=Progress(is_unwanted=lambda: len(seen) > 9),
         )
     checkpoint = train(egg_store, preset, out, time_budget_s=1.0, report=seen.append)
     assert checkpoint.training["seconds"] == pytest.approx(1.0, abs=0.05)
@@ -174,5 +182,6 @@ def test_fitting_recovers_the_code_of_a_shape_the_atlas_can_make(egg_atlas):
         missed = (network(points, covariates, found)[0] - target).abs().mean()
         without = (network(points, covariates, torch.zeros_like(found))[0] - target).abs().mean()
     assert missed < 0.2 * without + 1e-5
+    given_up = Progress(is_unwanted=lambda: True)
     with pytest.raises(Cancelled):
-        fit_latents(network, lambda rng: batch, covariates, config, only_distances, should_stop=lambda: True)
+        fit_latents(network, lambda rng: batch, covariates, config, only_distances, progress=given_up)
