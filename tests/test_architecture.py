@@ -19,6 +19,7 @@ FLOORS = {
     "naisr_model": (
         ("__init__",),
         ("errors", "files", "shipped", "covariates", "frames", "config", "progress"),
+        ("work",),
         ("data",),
         ("models",),
         ("surface",),

@@ -21,9 +21,9 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from naisr_model.data.patients import rim
-from naisr_model.errors import Cancelled, InputError
+from naisr_model.errors import InputError
+from naisr_model.progress import SILENT, Progress
 
-StopCheck = Callable[[], bool]
 Method = Literal["none", "icp", "landmarks"]
 METHODS: tuple[str, ...] = get_args(Method)
 Landmarks = Mapping[str, tuple[float, float, float]]
@@ -210,7 +210,7 @@ def propose(
     reference_mm: trimesh.Trimesh,
     alignment: Alignment | None = None,
     landmarks: Landmarks | None = None,
-    should_stop: StopCheck | None = None,
+    progress: Progress = SILENT,
 ) -> Proposal:
     """Find the motion of one scan to the atlas frame without making it.
 
@@ -220,11 +220,11 @@ def propose(
         reference_mm: the atlas's own shape, best at what is known of the patient, since size is kept.
         alignment: that of the atlas; for ``landmarks``.
         landmarks: those of the scan, in its coordinates; for ``landmarks``.
-        should_stop: polled while ``icp`` seeks.
+        progress: told the share of what ``icp`` seeks.
 
     Raises:
         InputError: when landmarks are asked for and the atlas or the scan has none or too few.
-        Cancelled: when ``should_stop()`` turned true.
+        Cancelled: when nobody waits any more.
     """
     transform, rival_deg, landmarks_mm = np.eye(4), None, None
     scan = _scan_side(mesh_mm, REFERENCE_POINTS)
@@ -235,7 +235,7 @@ def propose(
         transform = _landmark_transform(alignment, landmarks or {})
         landmarks_mm = _landmark_residual_mm(alignment, landmarks or {}, transform)
     elif method == "icp":
-        transform, rival_deg = _register(scan, reference, should_stop)
+        transform, rival_deg = _register(scan, reference, progress)
     before_mm, after_mm = (_mean_distance_mm(scan, reference, matrix) for matrix in (np.eye(4), transform))
     return Proposal(transform, before_mm, after_mm, _angle_deg(transform), rival_deg, landmarks_mm)
 
@@ -262,9 +262,7 @@ def _angle_deg(transform: NDArray[np.float64]) -> float:
     return float(np.degrees(Rotation.from_matrix(transform[:3, :3]).magnitude()))
 
 
-def _register(
-    scan: _Side, reference: _Side, should_stop: StopCheck | None
-) -> tuple[NDArray[np.float64], float | None]:
+def _register(scan: _Side, reference: _Side, progress: Progress) -> tuple[NDArray[np.float64], float | None]:
     """Trimmed closest points from several starts, and how far another orientation lies that does as well.
 
     Of the orientations that explain the scan about equally well, the one nearest to the file's own is
@@ -272,23 +270,27 @@ def _register(
     """
     few = _thinned(scan, START_POINTS), _thinned(reference, START_POINTS)
     found = [
-        _closest_points(*few, one, _overlapping, START_ITERATIONS, should_stop)
-        for one in _promising(scan, reference, should_stop)
+        _closest_points(*few, one, _overlapping, START_ITERATIONS, piece)
+        for one, piece in progress.part(0.4, 0.8).over(_promising(scan, reference, progress.part(0.0, 0.4)))
     ]
     costs = np.array([_misfit_mm(*few, transform) for transform in found])
     best = _nearest_upright(found, costs)
     away = np.array([_angle_deg(other @ np.linalg.inv(found[best])) for other in found])
     rivals = np.flatnonzero((away > RIVAL_DEG) & (costs <= DOUBTFUL * costs[best]))
-    transform = _closest_points(scan, reference, found[best], _overlapping, ICP_ITERATIONS, should_stop)
+    transform = _closest_points(scan, reference, found[best], _overlapping, ICP_ITERATIONS, progress)
+    progress.tell(1)
     return transform, float(away[rivals[costs[rivals].argmin()]]) if len(rivals) else None
 
 
-def _promising(scan: _Side, reference: _Side, should_stop: StopCheck | None) -> list[NDArray[np.float64]]:
+def _promising(scan: _Side, reference: _Side, progress: Progress) -> list[NDArray[np.float64]]:
     """The best of many starts after some quick steps, no two alike."""
     clouds = _thinned(_as_cloud(scan), SCOUT_POINTS), _thinned(_as_cloud(reference), SCOUT_POINTS)
     rotations = [np.eye(3), *_turns(scan, reference)]
     starts = [np.eye(4)] + [start for rotation in rotations for start in _shifted(scan, reference, rotation)]
-    tried = [_closest_points(*clouds, one, _overlapping, SCOUT_ITERATIONS, should_stop) for one in starts]
+    tried = [
+        _closest_points(*clouds, one, _overlapping, SCOUT_ITERATIONS, piece)
+        for one, piece in progress.over(starts)
+    ]
     few = _thinned(scan, SCOUT_POINTS), _thinned(reference, SCOUT_POINTS)
     centre, length_mm = scan.samples.mean(axis=0), float(np.ptp(reference.samples, axis=0).max())
     chosen: list[NDArray[np.float64]] = []
@@ -378,7 +380,7 @@ def _closest_point_transform(alignment: Alignment, mesh_mm: trimesh.Trimesh) -> 
     reference = _point_side(points, points, np.ones(len(points), dtype=bool))
     scan = _surface_side(mesh_mm, len(points))
     start = _matrix(np.eye(3), points.mean(axis=0) - scan.samples.mean(axis=0))
-    return _closest_points(scan, reference, start, _everything, ICP_ITERATIONS, None)
+    return _closest_points(scan, reference, start, _everything, ICP_ITERATIONS, SILENT)
 
 
 Nearest = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.bool_]]]
@@ -498,7 +500,7 @@ def _closest_points(
     start: NDArray[np.float64],
     kept: Kept,
     iterations: int,
-    should_stop: StopCheck | None,
+    progress: Progress,
 ) -> NDArray[np.float64]:
     """Iterative closest points in both directions at once (Besl and McKay, 1992).
 
@@ -511,15 +513,14 @@ def _closest_points(
         start: 4x4, scan to reference.
         kept: which of the sound pairs of each direction count.
         iterations: at most so many.
-        should_stop: polled before every iteration.
+        progress: asked before every iteration whether anybody waits.
 
     Raises:
-        Cancelled: when ``should_stop()`` turned true.
+        Cancelled: when nobody waits any more.
     """
     rotation, shift_mm = start[:3, :3], start[:3, 3]
     for _ in range(iterations):
-        if should_stop is not None and should_stop():
-            raise Cancelled
+        progress.check()
         last = scan.samples @ rotation.T + shift_mm
         pairs = _pairs(scan, reference, _matrix(rotation, shift_mm))
         used = [kept(one.distances_mm) for one in pairs]

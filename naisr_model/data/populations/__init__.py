@@ -2,12 +2,12 @@
 
 A population module offers ``visits(seed, patients)``, ``visit_shape(visit)``, ``true_shape(values)``,
 ``true_landmarks(values)``, ``growth_path()`` and
-``write_population(out, *, seed, patients, progress, should_stop)``, see :class:`PopulationModule`.
+``write_population(out, *, seed, patients, progress)``, see :class:`PopulationModule`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
@@ -16,6 +16,7 @@ from typing import Any, Protocol, cast
 import trimesh
 
 from naisr_model.errors import InputError
+from naisr_model.progress import SILENT, Progress
 
 Landmarks = dict[str, tuple[float, float, float]]
 
@@ -68,8 +69,7 @@ class PopulationModule(Protocol):
         *,
         seed: int,
         patients: int = ...,
-        progress: Callable[[float], None] | None = None,
-        should_stop: Callable[[], bool] | None = None,
+        progress: Progress = SILENT,
     ) -> Path:
         """Write meshes and a table into ``out``; returns the path of the table."""
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,8 +27,9 @@ from naisr_model.data.populations.airway_growth import (
     median_weight_kg,
     sizes,
 )
-from naisr_model.errors import Cancelled, InputError
+from naisr_model.errors import InputError
 from naisr_model.files import replacing
+from naisr_model.progress import SILENT, Progress
 
 __all__ = [
     "Visit",
@@ -274,15 +275,11 @@ def _row(visit: Visit) -> list[str]:
     return [_mesh_name(visit), _landmarks_name(visit), visit.subject, visit.visit, age, weight, sex]
 
 
-def _wait_for(
-    jobs: list[Future[None]], progress: Callable[[float], None] | None, stop: Callable[[], bool]
-) -> None:
+def _wait_for(jobs: list[Future[None]], progress: Progress) -> None:
     for done, job in enumerate(as_completed(jobs), start=1):
         job.result()
-        if progress is not None:
-            progress(done / len(jobs))
-        if stop():
-            raise Cancelled
+        progress.tell(done / len(jobs))
+        progress.check()
 
 
 def write_population(
@@ -290,8 +287,7 @@ def write_population(
     *,
     seed: int,
     patients: int = COHORT_PATIENTS,
-    progress: Callable[[float], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
+    progress: Progress = SILENT,
 ) -> Path:
     """Write the population as a hospital would hand it over: every scan in its own pose.
 
@@ -299,21 +295,20 @@ def write_population(
         out: folder for ``data.csv``, ``data.toml``, ``meshes/*.ply`` and ``landmarks/*.csv``.
         seed: the same seed gives the same files.
         patients: 263 is the size of the published cohort.
-        progress: receives the finished fraction.
-        should_stop: polled after every shape.
+        progress: told the finished share.
 
     Returns:
         The path of ``data.csv`` (columns mesh, landmarks, subject, visit, age, weight, sex).
 
     Raises:
         InputError: for fewer than one patient or a negative seed.
-        Cancelled: when ``should_stop()`` turned true.
+        Cancelled: when nobody waits any more.
     """
     everybody = visits(seed, patients)
     pool = ThreadPoolExecutor(_WRITERS)
     try:
         jobs = [pool.submit(_write_visit, out, visit) for visit in everybody]
-        _wait_for(jobs, progress, should_stop or (lambda: False))
+        _wait_for(jobs, progress)
     finally:
         pool.shutdown(cancel_futures=True)
     source = f'\n[source]\npopulation = "airway"\nseed = {seed}\npatients = {patients}\n'

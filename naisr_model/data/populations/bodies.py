@@ -16,7 +16,7 @@ its cache folder (``ANNY_CACHE_DIR``, by default ``~/.cache/anny``). Nothing is 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -29,8 +29,9 @@ from numpy.typing import NDArray
 
 from naisr_model.covariates import Covariate, Population
 from naisr_model.data.tables import write_table
-from naisr_model.errors import Cancelled, InputError
+from naisr_model.errors import InputError
 from naisr_model.files import replacing
+from naisr_model.progress import SILENT, Progress
 
 __all__ = [
     "COVARIATES_TOML",
@@ -246,8 +247,7 @@ def write_population(
     *,
     seed: int,
     patients: int = COHORT_PEOPLE,
-    progress: Callable[[float], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
+    progress: Progress = SILENT,
 ) -> Path:
     """Write the population as a folder of scans with a table.
 
@@ -255,25 +255,20 @@ def write_population(
         out: folder for ``data.csv``, ``data.toml`` and ``meshes/*.ply``.
         seed: the same seed gives the same files.
         patients: number of people.
-        progress: receives the finished fraction.
-        should_stop: polled before every shape.
+        progress: told the finished share.
 
     Returns:
         The path of ``data.csv`` (columns mesh, subject, visit, age, weight, sex).
 
     Raises:
         InputError: for nobody, a negative seed, or without the package ``anny``.
-        Cancelled: when ``should_stop()`` turned true.
+        Cancelled: when nobody waits any more.
     """
     people = visits(seed, patients)
     meshes = [f"meshes/{person.subject}.ply" for person in people]
-    for done, (person, mesh) in enumerate(zip(people, meshes, strict=True), start=1):
-        if should_stop is not None and should_stop():
-            raise Cancelled
+    for (person, mesh), _ in progress.over(list(zip(people, meshes, strict=True))):
         with replacing(out / mesh) as temporary:
             visit_shape(person)[0].export(temporary, encoding="binary")
-        if progress is not None:
-            progress(done / len(people))
     source = f'\n[source]\npopulation = "bodies"\nseed = {seed}\npatients = {patients}\n'
     with replacing(out / "data.toml") as temporary:
         temporary.write_text('name = "bodies"\n\n' + COVARIATES_TOML + source, encoding="utf-8")

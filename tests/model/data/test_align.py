@@ -18,6 +18,7 @@ from naisr_model.data.align import (
     rigid_transform,
 )
 from naisr_model.errors import Cancelled, InputError
+from naisr_model.progress import Progress
 
 NAMES = ("cords", "carina", "choana", "epiglottis", "tongue base")
 POINTS = np.array([[0, 0, 0], [0, -5, -90], [5, 40, 80], [0, 12, 25], [-8, 20, 40]], dtype=float)
@@ -195,7 +196,7 @@ def test_of_orientations_that_do_as_well_the_files_own_is_kept_and_the_doubt_is_
 def test_an_alignment_can_be_stopped():
     polls = iter([False] * 5 + [True])
     with pytest.raises(Cancelled):
-        propose("icp", knobbly(), branched(), should_stop=lambda: next(polls))
+        propose("icp", knobbly(), branched(), progress=Progress(is_unwanted=lambda: next(polls)))
 
 
 SHIFT_MM = np.array([-5.0, 8.0, -12.0])

@@ -22,6 +22,7 @@ from naisr_model.data import meshes
 from naisr_model.data.prepare import PrepareOptions, prepare
 from naisr_model.data.store import SampleStore
 from naisr_model.errors import Cancelled, InputError
+from naisr_model.progress import Progress
 
 SMALL = PrepareOptions(surface_samples=400, near_samples=800, uniform_samples=300, workers=1)
 AXES_MM = np.array([20.0, 14.0, 30.0])
@@ -71,7 +72,7 @@ def ellipsoid_values(points_mm, size) -> np.ndarray:
 
 def test_a_cohort_becomes_a_store_in_one_frame(cohort, tmp_path):
     fractions: list[float] = []
-    report = prepare(cohort, tmp_path / "store", options=SMALL, progress=fractions.append)
+    report = prepare(cohort, tmp_path / "store", options=SMALL, progress=Progress(fractions.append))
     assert report.accepted == tuple(range(2, 12))
     assert (report.skipped, report.rejected, report.warnings) == ((), (), ())
     assert fractions == sorted(fractions)
@@ -254,8 +255,7 @@ def test_a_cancelled_run_goes_on_later(cohort, tmp_path, workers):
             cohort,
             cut,
             options=replace(SMALL, workers=workers),
-            progress=heard.append,
-            should_stop=two_are_finished,
+            progress=Progress(heard.append, two_are_finished),
         )
     assert not (cut / "store.json").exists()
     done = finished_shapes(cut)
@@ -268,7 +268,7 @@ PROGRAM = """
 import contextlib, multiprocessing, os, signal, sys, threading
 from naisr_model.data import prepare
 
-write = prepare._write_samples
+write = prepare.write_samples
 
 
 def write_or_kill(job):
@@ -281,7 +281,7 @@ def write_or_kill(job):
 
 
 if __name__ == "__main__":
-    prepare._write_samples = write_or_kill
+    prepare.write_samples = write_or_kill
     options = prepare.PrepareOptions(400, 800, 300, workers=2)
     prepare.prepare(sys.argv[1], sys.argv[2], options=options)
 """

@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 from naisr_model.data.populations import POPULATIONS, PopulationModule, airway, population
 from naisr_model.data.tables import read_table
 from naisr_model.errors import Cancelled, InputError
+from naisr_model.progress import Progress
 
 # Age (months), weight (kg), sex and airway volume (cm3) at the age percentiles 0, 10, ... 100 of the
 # published cohort (NAISR, ICLR 2024).
@@ -283,7 +284,7 @@ def read_landmarks(path: Path) -> dict[str, NDArray[np.float64]]:
 
 def test_written_files_describe_the_population(tmp_path: Path) -> None:
     heard: list[float] = []
-    table = airway.write_population(tmp_path, seed=2, patients=3, progress=heard.append)
+    table = airway.write_population(tmp_path, seed=2, patients=3, progress=Progress(heard.append))
     assert heard[-1] == 1
     assert heard == sorted(heard)
     assert table == tmp_path / "data.csv"
@@ -331,7 +332,7 @@ def test_same_seed_same_files(tmp_path: Path) -> None:
 
 def test_writing_can_be_stopped(tmp_path: Path) -> None:
     with pytest.raises(Cancelled):
-        airway.write_population(tmp_path, seed=0, patients=200, should_stop=lambda: True)
+        airway.write_population(tmp_path, seed=0, patients=200, progress=Progress(is_unwanted=lambda: True))
     assert not (tmp_path / "data.csv").exists()
     assert len(list((tmp_path / "meshes").glob("*.ply"))) < 10
 

@@ -18,6 +18,7 @@ from naisr_model.errors import Cancelled, InputError
 pytest.importorskip("anny")
 
 from naisr_model.data.populations import PopulationModule, bodies, population
+from naisr_model.progress import Progress
 
 # Median standing heights in cm, girls and boys, rounded: child growth standards (1, 2, 5 years) and
 # reference 2007 (10, 19 years) of the World Health Organization.
@@ -112,7 +113,9 @@ def test_the_population_goes_through_the_pipeline(tmp_path):
     module: PopulationModule = bodies  # what the type checker must agree with
     assert population("bodies") is module
     fractions: list[float] = []
-    csv = bodies.write_population(tmp_path / "people", seed=0, patients=5, progress=fractions.append)
+    csv = bodies.write_population(
+        tmp_path / "people", seed=0, patients=5, progress=Progress(fractions.append)
+    )
     assert fractions[-1] == 1.0
     table = read_table(csv)
     assert [(c.name, c.unit, c.kind) for c in table.covariates] == [
@@ -136,7 +139,7 @@ def test_the_population_goes_through_the_pipeline(tmp_path):
 
 def test_writing_can_be_cancelled(tmp_path):
     with pytest.raises(Cancelled):
-        bodies.write_population(tmp_path, seed=0, patients=3, should_stop=lambda: True)
+        bodies.write_population(tmp_path, seed=0, patients=3, progress=Progress(is_unwanted=lambda: True))
     assert not (tmp_path / "data.csv").exists()
 
 

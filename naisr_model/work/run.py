@@ -1,0 +1,131 @@
+"""Many like jobs over processes, or one after the other in this one, with the same results.
+
+>>> with processes(1) as run:
+...     in_order(run(abs, [-3, 2]))
+[3, 2]
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from functools import partial
+from operator import itemgetter
+from typing import Any, Protocol, TypeVar
+
+from threadpoolctl import threadpool_limits
+
+from naisr_model.errors import InputError
+from naisr_model.progress import SILENT, Progress
+
+Job = TypeVar("Job")
+Result = TypeVar("Result")
+
+POLL_S = 0.2
+"""So long at most a cancelled run waits before it is noticed."""
+
+THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "IGL_NUM_THREADS")
+"""What tells libraries that a process has yet to load how many threads to start."""
+
+
+class Run(Protocol):
+    """What :func:`processes` hands out."""
+
+    def __call__(
+        self, function: Callable[[Job], Result], jobs: Sequence[Job], progress: Progress = SILENT
+    ) -> Iterator[tuple[int, Result]]:
+        """Number of a job and what ``function`` made of it, as each is finished.
+
+        With several processes ``function`` is of a module, and jobs and results can be pickled.
+
+        Raises:
+            InputError: when a process died.
+            Cancelled: when nobody waits any more.
+        """
+
+
+@contextmanager
+def processes(workers: int | None = None) -> Iterator[Run]:
+    """Hands out :class:`Run`, over processes that stay until the end; a killed parent takes them along.
+
+    Args:
+        workers: how many; None for one a core, 1 to stay in this process.
+
+    Raises:
+        InputError: for fewer than one.
+    """
+    count = cores() if workers is None else workers
+    if count < 1:
+        raise InputError(f"the number of workers is {count}; give at least 1")
+    if count == 1:
+        yield _run_here
+        return
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(count, mp_context=context, initializer=_start_worker)
+    try:
+        yield partial(_run_in, pool)
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def in_order(results: Iterable[tuple[int, Result]]) -> list[Result]:
+    """What :class:`Run` gives, in the order of the jobs."""
+    return [result for _, result in sorted(results, key=itemgetter(0))]
+
+
+def cores() -> int:
+    """Fewer than the machine has where a container or a batch system hands out a share."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _run_here(
+    function: Callable[[Job], Result], jobs: Sequence[Job], progress: Progress = SILENT
+) -> Iterator[tuple[int, Result]]:
+    for (number, job), _ in progress.over(list(enumerate(jobs))):
+        yield number, function(job)
+
+
+def _run_in(
+    pool: ProcessPoolExecutor,
+    function: Callable[[Job], Result],
+    jobs: Sequence[Job],
+    progress: Progress = SILENT,
+) -> Iterator[tuple[int, Result]]:
+    try:
+        numbers = {pool.submit(function, job): number for number, job in enumerate(jobs)}
+        pending = set(numbers)
+        while pending:
+            progress.check()
+            done, pending = wait(pending, timeout=POLL_S, return_when=FIRST_COMPLETED)
+            for future in sorted(done, key=numbers.__getitem__):
+                yield numbers[future], future.result()
+            if done:
+                progress.tell(1 - len(pending) / len(jobs))
+    except BrokenProcessPool as error:
+        raise InputError(
+            "a worker process died, most likely for lack of memory; run again with fewer workers"
+        ) from error
+
+
+def _start_worker() -> None:
+    """One thread a worker, which leaves when its parent says so and not at the Ctrl+C of a terminal."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.environ.update(dict.fromkeys(THREADS, "1"))
+    threadpool_limits(1)
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_leave_with, args=(parent,), daemon=True).start()
+
+
+def _leave_with(parent: Any) -> None:
+    """A killed parent cannot end its workers, and they would wait for work for ever."""
+    parent.join()
+    os._exit(1)

@@ -1,0 +1,75 @@
+"""Jobs over processes: the same results as in one, and what becomes of them when somebody stops or dies."""
+
+from __future__ import annotations
+
+import doctest
+import math
+import os
+import time
+
+import pytest
+
+from naisr_model.errors import Cancelled, InputError
+from naisr_model.progress import Progress
+from naisr_model.work import run
+from naisr_model.work.run import cores, in_order, processes
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_results_come_with_the_number_of_their_job(workers):
+    told: list[float] = []
+    with processes(workers) as work:
+        results = list(work(math.sqrt, [9.0, 4.0, 1.0], Progress(told.append)))
+        assert sorted(results) == [(0, 3.0), (1, 2.0), (2, 1.0)]
+        assert in_order(work(abs, [-3, 5])) == [3, 5]
+    assert told == sorted(told) and told[-1] == pytest.approx(1.0)
+
+
+def test_one_worker_stays_in_this_process_and_two_do_not():
+    for workers in (1, 2):
+        with processes(workers) as work:
+            ((_, value),) = work(eval, ["__import__('os').getpid()"])
+        assert (value == os.getpid()) is (workers == 1)
+
+
+def test_a_worker_has_one_thread():
+    with processes(2) as work:
+        assert in_order(work(os.getenv, ["OMP_NUM_THREADS"])) == ["1"]
+        assert in_order(work(eval, ["__import__('torch').get_num_threads()"])) == [1]
+
+
+def test_a_result_is_there_before_the_other_jobs_are_done():
+    with processes(2) as work:
+        results = work(time.sleep, [60.0, 0.0])
+        assert next(results)[0] == 1
+        pid = in_order(work(eval, ["__import__('os').getpid()"]))[0]
+        assert pid != os.getpid()
+        os.kill(pid, 9)
+        with pytest.raises(InputError, match="run again with fewer workers"):
+            list(results)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_mistake_in_a_job_is_raised_here(workers):
+    with processes(workers) as work, pytest.raises(ValueError, match=r"math domain|nonnegative"):
+        list(work(math.sqrt, [4.0, -1.0]))
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_nobody_waits_any_more(workers):
+    finished: list[int] = []
+    two_are_enough = Progress(is_unwanted=lambda: len(finished) >= 2)
+    with pytest.raises(Cancelled), processes(workers) as work:
+        for number, _ in work(abs, range(1000), two_are_enough):
+            finished.append(number)
+    assert 2 <= len(finished) < 1000
+
+
+def test_a_number_of_workers_that_makes_no_sense():
+    with pytest.raises(InputError, match="the number of workers is 0; give at least 1"), processes(0):
+        pass
+    assert cores() >= 1
+
+
+def test_the_example_in_the_documentation():
+    assert doctest.testmod(run).failed == 0
