@@ -38,8 +38,8 @@ from naisr_model.learning.fitting.posterior import (
 from naisr_model.learning.fitting.prior import Prior, places_of, prior_of
 from naisr_model.learning.fitting.search import ShapeFit, draw_sample, fit_shape
 from naisr_model.learning.fitting.target import target_of
+from naisr_model.models.base import Capabilities, ShapeModel, additive, deformable
 from naisr_model.models.devices import usable_device
-from naisr_model.models.naisr.network import Naisr
 from naisr_model.progress import SILENT, Progress
 from naisr_model.surface.displacements import Displacements, DisplacementTables, tabulate
 from naisr_model.surface.fields import distances, effect_field, shape_field, template_field
@@ -92,7 +92,7 @@ class Atlas:
     def __init__(self, checkpoint: Checkpoint, device: str | torch.device = "cpu") -> None:
         self.checkpoint = checkpoint
         self.device = usable_device(device)
-        self._network = checkpoint.network().to(self.device).requires_grad_(False)
+        self._model = checkpoint.model().to(self.device).requires_grad_(False)
 
     @classmethod
     def load(cls, path: str | Path, device: str | torch.device = "cpu") -> Atlas:
@@ -114,13 +114,23 @@ class Atlas:
         return self.checkpoint.name
 
     @property
+    def model_title(self) -> str:
+        """The shape model as people call it, for example ``NAISR``."""
+        return self._model.title
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What the shape model can do; asking for anything else is an :class:`InputError`."""
+        return self._model.capabilities
+
+    @cached_property
     def population(self) -> Population:
-        """Whom the atlas was made from, with their covariates in real units."""
-        return self.checkpoint.population
+        """Whom the atlas was made from, with those covariates in real units that shapes depend on."""
+        return self._model.relevant(self.checkpoint.population)
 
     @property
     def covariates(self) -> tuple[Covariate, ...]:
-        """The covariates, each with name, unit, kind and observed range."""
+        """Those covariates, each with name, unit, kind and observed range; there may be none."""
         return self.population.covariates
 
     @property
@@ -150,12 +160,12 @@ class Atlas:
             Millimetres, negative inside, ``[n]``.
 
         Raises:
-            InputError: for an unknown covariate or one out of range.
+            InputError: for an unknown covariate or one out of range (unless ``extrapolate``).
         """
         points = self.frame.to_model(points_mm).astype(np.float32).reshape(-1, self.frame.dim)
         vector, code = self._vector(covariates, extrapolate), self._latent(latent)
         chunks = [
-            distances(self._network, points[start : start + CHUNK], vector, code)
+            distances(self._model, points[start : start + CHUNK], vector, code)
             for start in range(0, len(points), CHUNK)
         ]
         return np.concatenate([np.zeros(0), *chunks]) * self.frame.scale_mm
@@ -170,7 +180,7 @@ class Atlas:
         tracker: Tracker | None = None,
         progress: Progress = SILENT,
     ) -> trimesh.Trimesh:
-        """The full shape, the zero level set of Phi(p, c, z) = T(p + sum_i g_i(p, c_i, z)).
+        """The full shape, the zero level set of Phi(p, c, z).
 
         A ``tracker`` of this atlas and code makes it several times faster; the surface is the same.
 
@@ -178,7 +188,7 @@ class Atlas:
             InputError: for an unknown covariate or one out of range (unless ``extrapolate``).
             Cancelled: when nobody waits for it any more.
         """
-        field = shape_field(self._network, self._vector(covariates, extrapolate), self._latent(latent))
+        field = shape_field(self._model, self._vector(covariates, extrapolate), self._latent(latent))
         guess = None if tracker is None else tracker.guess(covariates)
         return self._surface(field, resolution, progress, guess)
 
@@ -193,18 +203,21 @@ class Atlas:
         tracker: Tracker | None = None,
         progress: Progress = SILENT,
     ) -> trimesh.Trimesh:
-        """The disentangled shape of one covariate, Phi_i(p, c_i, z) = T(p + g_i(p, c_i, z)).
+        """The disentangled shape of one covariate, Phi_i(p, c_i, z): Phi with the others at their centre.
 
         The displacements of several covariates add at one query point; these surfaces do not. A
         ``tracker`` of this atlas and code makes it several times faster; the surface is the same.
 
         Raises:
-            InputError: for an unknown covariate or one out of range (unless ``extrapolate``).
+            InputError: for an unknown covariate or one out of range (unless ``extrapolate``), and where
+                the model is not disentangleable.
             Cancelled: when nobody waits for it any more.
         """
+        if not self.capabilities.disentangleable:
+            raise InputError(f"{self.model_title} does not tell covariates apart; ask for the whole shape")
         vector = self._vector({name: value}, extrapolate)
         index = self.population.names.index(name)
-        field = effect_field(self._network, index, vector, self._latent(latent))
+        field = effect_field(self._model, index, vector, self._latent(latent))
         guess = None if tracker is None else tracker.guess({name: value})
         return self._surface(field, resolution, progress, guess)
 
@@ -214,12 +227,13 @@ class Atlas:
         *,
         progress: Progress = SILENT,
     ) -> trimesh.Trimesh:
-        """The template, the zero level set of T: the shape at the population centre.
+        """The template, the zero level set of T.
 
         Raises:
+            InputError: where the model deforms none.
             Cancelled: when nobody waits for it any more.
         """
-        return self._surface(template_field(self._network), resolution, progress)
+        return self._surface(template_field(deformable(self._model)), resolution, progress)
 
     def tabulate(
         self,
@@ -236,12 +250,14 @@ class Atlas:
             progress: told the finished share, checked between chunks of points.
 
         Raises:
+            InputError: where the model gives the covariates no displacements of their own.
             Cancelled: when nobody waits for it any more.
         """
+        model = additive(self._model)
         ranges = [(float(low), float(high)) for low, high in (c.normalise(c.range) for c in self.covariates)]
         bounds = self.frame.to_model(template.bounds)
         code = self._latent(latent)
-        return tabulate(self._network, ranges, code, bounds, progress=progress)
+        return tabulate(model, ranges, code, bounds, progress=progress)
 
     def tracker(self, template: trimesh.Trimesh, tables: DisplacementTables) -> CodeTracker:
         """What carries ``template`` to any covariates in milliseconds, vertex by vertex.
@@ -251,14 +267,18 @@ class Atlas:
         Args:
             template: a mesh that :meth:`template` gave.
             tables: from :meth:`tabulate`.
+
+        Raises:
+            InputError: where the model gives the covariates no displacements of their own.
         """
-        return make_tracker(self._network, self.covariates, self.frame, template, tables)
+        return make_tracker(additive(self._model), self.covariates, self.frame, template, tables)
 
     def fit(
         self,
         shape: trimesh.Trimesh | ArrayLike,
         known: Values | None = None,
         *,
+        extrapolate: bool = False,
         progress: Progress = SILENT,
     ) -> Fit:
         """The code and the unknown covariates that explain a patient's shape best, and how sure they are.
@@ -266,28 +286,30 @@ class Atlas:
         Args:
             shape: a mesh, watertight or open, or points ``[n, 3]``; millimetres of the atlas frame.
             known: covariate values in real units; those left out are inferred.
+            extrapolate: allow known values outside the observed range.
             progress: told the finished share, checked between steps.
 
         Raises:
-            InputError: for an unknown covariate or one out of range, or a shape that has too few points.
+            InputError: for an unknown covariate or one out of range (unless ``extrapolate``), or a shape
+                that has too few points.
             Cancelled: when nobody waits for it any more.
         """
         started = time.perf_counter()
         known = dict(known or {})
-        complete(self.covariates, known)
+        self.complete(known, extrapolate=extrapolate)
         vector = np.array(
             [float(c.normalise(known[c.name])) if c.name in known else np.nan for c in self.covariates]
         )
         binary = [i for i, covariate in enumerate(self.covariates) if covariate.kind == "binary"]
         target = target_of(shape, self.frame)
-        network = self._cpu_network
+        model = self._cpu_model
         # Threads of NumPy's linear algebra spin when it is torch's turn: on two cores twice the time.
         with threadpool_limits(1, user_api="blas"):
-            fits = fit_shape(network, target, self._prior, vector, binary, progress=progress)
-            posterior = posterior_of(network, target, self._prior, fits[0])
+            fits = fit_shape(model, target, self._prior, vector, binary, progress=progress)
+            posterior = posterior_of(model, target, self._prior, fits[0])
         check = draw_sample(target, POINTS, CHECK_SAMPLE).points[:POINTS].numpy()
-        found, code = network.tensor(fits[0].covariates), network.tensor(fits[0].latent)
-        residuals = np.abs(distances(network, check, found, code))
+        found, code = model.tensor(fits[0].covariates), model.tensor(fits[0].latent)
+        residuals = np.abs(distances(model, check, found, code))
         return Fit(
             Individual(self, fits[0].covariates, fits[0].latent, posterior),
             tuple(fits),
@@ -296,23 +318,36 @@ class Atlas:
             seconds=time.perf_counter() - started,
         )
 
+    def complete(self, covariates: Values, *, extrapolate: bool = False) -> dict[str, float]:
+        """Real values of all covariates; those left out are at the population centre.
+
+        Raises:
+            InputError: for an unknown covariate or one out of range (unless ``extrapolate``), and for any
+                where shapes depend on none.
+        """
+        if covariates and not self.capabilities.evolvable:
+            raise InputError(
+                f"shapes of {self.model_title} depend on no covariates; leave out {', '.join(covariates)}"
+            )
+        return complete(self.covariates, covariates, extrapolate=extrapolate)
+
     @cached_property
-    def _cpu_network(self) -> Naisr:
+    def _cpu_model(self) -> ShapeModel:
         if self.device.type == "cpu":
-            return self._network
-        return self.checkpoint.network().requires_grad_(False)
+            return self._model
+        return self.checkpoint.model().requires_grad_(False)
 
     @cached_property
     def _prior(self) -> Prior:
         return prior_of(self.population, self.checkpoint.latents)
 
     def _vector(self, covariates: Values, extrapolate: bool) -> Tensor:
-        values = complete(self.covariates, covariates, extrapolate=extrapolate)
-        return self._network.tensor(normalised_vector(self.covariates, values))
+        values = self.complete(covariates, extrapolate=extrapolate)
+        return self._model.tensor(normalised_vector(self.covariates, values))
 
     def _latent(self, latent: ArrayLike | None) -> Tensor:
         length = self.checkpoint.preset.network.latent
-        code = self._network.tensor(np.zeros(length) if latent is None else latent)
+        code = self._model.tensor(np.zeros(length) if latent is None else latent)
         if code.shape != (length,):
             raise InputError(f"the latent code has shape {tuple(code.shape)}; this atlas needs ({length},)")
         return code
@@ -399,6 +434,7 @@ class Individual:
             progress: told the finished share, checked between chunks of points.
 
         Raises:
+            InputError: where the model gives the covariates no displacements of their own.
             Cancelled: when nobody waits for it any more.
         """
         atlas, lasting = self.atlas, self.posterior.problem.prior.lasting
@@ -407,7 +443,7 @@ class Individual:
         tracker = atlas.tracker(template, far)
 
         def nearness_of(values: Values) -> float:
-            known = complete(atlas.covariates, values, extrapolate=True)
+            known = atlas.complete(values, extrapolate=True)
             return nearness(self.posterior, normalised_vector(atlas.covariates, known))
 
         return FadingTracker(
@@ -518,7 +554,7 @@ class Fit:
         if self.residual_mm > MISSED_SHARE * self.individual.atlas.frame.scale_mm:
             sentences.append(
                 f"the fitted surface is {self.residual_mm:.2g} mm from the shape on average: "
-                "check the alignment and the known covariates"
+                f"check the alignment{' and the known covariates' if self.covariates else ''}"
             )
         for covariate in self.individual.atlas.covariates:
             low, high = self.intervals.get(covariate.name, (0.0, 0.0))
@@ -557,10 +593,15 @@ class Fit:
         visit to another is kept of it, see :meth:`Individual.elsewhere`.
 
         Raises:
-            InputError: for an unknown covariate or one out of range (unless ``extrapolate``).
+            InputError: for an unknown covariate or one out of range (unless ``extrapolate``), and where the
+                model is not transferable.
         """
         atlas = self.individual.atlas
-        known = complete(atlas.covariates, {**self.covariates, **values}, extrapolate=extrapolate)
+        if values and not atlas.capabilities.transferable:
+            raise InputError(
+                f"{atlas.model_title} does not carry shapes to other covariates; ask for the fitted shape"
+            )
+        known = atlas.complete({**self.covariates, **values}, extrapolate=extrapolate)
         return self.individual.elsewhere(normalised_vector(atlas.covariates, known))
 
     def _real(self, vector: NDArray[np.float64]) -> dict[str, float]:

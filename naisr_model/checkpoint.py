@@ -6,7 +6,8 @@ The format stores arrays and text only, so opening a file never executes anythin
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,13 +19,14 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor
 
-from naisr_model.config import Preset, from_json, to_json
+from naisr_model.config import Preset, to_json
 from naisr_model.covariates import Population
 from naisr_model.data.align import Alignment
 from naisr_model.errors import InputError
 from naisr_model.files import replacing
 from naisr_model.frames import Frame
-from naisr_model.models.naisr.network import Naisr
+from naisr_model.models.base import ShapeModel
+from naisr_model.models.factory import MODELS, build, model_of, read_preset
 
 FORMAT = "naisr-atlas"
 VERSION = 1
@@ -38,8 +40,8 @@ class Checkpoint:
 
     Attributes:
         name: of the population, for example ``airway``.
-        preset: network sizes and training settings.
-        weights: state dictionary of :class:`~naisr_model.models.naisr.network.Naisr`.
+        preset: the model, its sizes and training settings.
+        weights: state dictionary of the model.
         latents: codes of the training rows in population order, float32 ``[n_train, L]``.
         population: all rows, held-out ones included, with the covariates.
         frame: millimetres to model units.
@@ -58,11 +60,11 @@ class Checkpoint:
     source: Mapping[str, Any]
     training: Mapping[str, Any]
 
-    def network(self) -> Naisr:
-        """The networks with these weights, ready for inference."""
-        network = Naisr(self.preset.network, len(self.population.covariates))
-        network.load_state_dict(dict(self.weights))
-        return network.eval()
+    def model(self) -> ShapeModel:
+        """The shape model with these weights, ready for inference."""
+        model = build(self.preset, len(self.population.covariates))
+        model.load_state_dict(dict(self.weights))
+        return model.eval()
 
 
 def save(path: Path, checkpoint: Checkpoint) -> None:
@@ -89,7 +91,7 @@ def load(path: str | Path) -> Checkpoint:
     """Read a checkpoint.
 
     Raises:
-        InputError: for a file that is missing, damaged, foreign, or of a newer version.
+        InputError: for a file that is missing, damaged, foreign, of a newer version or an unknown model.
     """
     path = Path(path)
     if not path.is_file():
@@ -106,19 +108,34 @@ def load(path: str | Path) -> Checkpoint:
         raise InputError(f"{path} is a .safetensors file but not an atlas of this program")
     if int(metadata.get("version", 0)) > VERSION:
         raise InputError(f"{path} was written by a newer version of this program; update the program")
+    with _consistent(path):
+        record = json.loads(metadata["record"])
+        model = model_of(record["preset"])
+    if model not in MODELS:
+        raise InputError(
+            f"the atlas in {path} is of the model '{model}', which this program does not know; "
+            "update the program"
+        )
+    with _consistent(path):
+        checkpoint = _assemble(record, tensors)
+        checkpoint.model()
+    return checkpoint
+
+
+@contextmanager
+def _consistent(path: Path) -> Iterator[None]:
+    """Says in a sentence what does not fit together."""
     try:
-        checkpoint = _assemble(json.loads(metadata["record"]), tensors)
-        checkpoint.network()
-    except (KeyError, TypeError, ValueError, RuntimeError) as error:
+        yield
+    except (KeyError, TypeError, ValueError, RuntimeError, AttributeError) as error:
         reason = str(error).splitlines()[0]
         raise InputError(f"the atlas in {path} contradicts itself ({reason}); train it again") from error
-    return checkpoint
 
 
 def _assemble(record: dict[str, Any], tensors: dict[str, Tensor]) -> Checkpoint:
     return Checkpoint(
         name=str(record["name"]),
-        preset=from_json(Preset, record["preset"]),
+        preset=read_preset(record["preset"]),
         weights={k.removeprefix(_WEIGHT): v for k, v in tensors.items() if k.startswith(_WEIGHT)},
         latents=tensors[_LATENTS].numpy(),
         population=Population.from_json(record["population"]),

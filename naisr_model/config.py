@@ -1,8 +1,7 @@
-"""Frozen settings with named presets, readable from TOML.
+"""Frozen settings, readable from TOML.
 
-A preset is the whole description of a training. The ``paper-*`` presets carry the published
-settings of NAISR (Jiao et al., ICLR 2024, section "Implementation Details"); ``demo`` is the one
-that trains on two CPU cores, and its comments say why it differs.
+A preset is the whole description of a training. What is here is common to all shape models; the sizes of
+a model's networks and its named presets stand with the model, see :mod:`naisr_model.models.factory`.
 """
 
 from __future__ import annotations
@@ -36,19 +35,15 @@ class SirenConfig:
 
 @dataclass(frozen=True)
 class NetworkConfig:
-    """Sizes of the template network T and of the displacement networks f_i.
+    """What the networks of every shape model have; each model adds its own sizes.
 
     Attributes:
         dim: 2 for curves, 3 for surfaces.
         latent: length of the latent code z.
-        template: the network T.
-        displacement: every network f_i.
     """
 
     dim: int = 3
     latent: int = 256
-    template: SirenConfig = field(default_factory=SirenConfig)
-    displacement: SirenConfig = field(default_factory=SirenConfig)
 
 
 @dataclass(frozen=True)
@@ -99,8 +94,8 @@ class TrainingConfig:
         surface_points: on-surface points of a shape in a batch.
         near_points: off-surface points close to the surface.
         uniform_points: off-surface points uniform in the box; too few of them leave ghost surfaces.
-        template_rate: Adam's learning rate for the network T.
-        displacement_rate: Adam's learning rate for the networks f_i.
+        template_rate: Adam's learning rate for the network that gives distances, a template's or a shape's.
+        displacement_rate: Adam's learning rate for the networks that move points, where there are any.
         latent_rate: Adam's learning rate for the codes.
         cosine: let the rates fall to zero along a cosine instead of staying constant.
         population_share: first part of the training, in which every code is 0, so that the
@@ -135,10 +130,17 @@ class TrainingConfig:
 
 @dataclass(frozen=True)
 class Preset:
-    """Everything that ``naisr train`` needs to know beside the data."""
+    """Everything that ``naisr train`` needs to know beside the data.
 
-    network: NetworkConfig = field(default_factory=NetworkConfig)
-    training: TrainingConfig = field(default_factory=TrainingConfig)
+    Attributes:
+        model: name of the shape model, see :mod:`naisr_model.models.factory`.
+        network: sizes of that model's networks, of its own kind.
+        training: how they are optimised.
+    """
+
+    model: str
+    network: NetworkConfig
+    training: TrainingConfig
 
 
 @dataclass(frozen=True)
@@ -160,80 +162,18 @@ class FitConfig:
     seed: int = 0
 
 
-_DEEP = SirenConfig(hidden=6)
-
-PRESETS: dict[str, Preset] = {
-    "paper-airway": Preset(),
-    "paper-hippocampus": Preset(
-        NetworkConfig(template=_DEEP, displacement=_DEEP), TrainingConfig(epochs=300)
-    ),
-    "paper-starman": Preset(
-        NetworkConfig(dim=2, template=_DEEP, displacement=_DEEP), TrainingConfig(epochs=300)
-    ),
-    # Low frequencies train in minutes what omega0 = 30 needs hours for; the displacement is the
-    # smoother of the two, because anatomy changes with age more slowly than it bends in space.
-    # Half of the off-surface points are uniform in the box: thin tubes leave ghosts otherwise.
-    # Distances are judged to first order (losses.first_order_distance) and only the template must be
-    # a distance itself: with the paper's terms an infant's airway stays too wide. The codes are
-    # residuals with a weak prior: the paper's prior, at these rates, keeps them at 0.
-    "demo": Preset(
-        NetworkConfig(
-            latent=64,
-            template=SirenConfig(width=192, hidden=3, omega0=10.0),
-            displacement=SirenConfig(width=128, hidden=2, omega0=3.0),
-        ),
-        TrainingConfig(
-            epochs=300,
-            batch_shapes=16,
-            surface_points=64,
-            near_points=32,
-            uniform_points=32,
-            template_rate=5e-4,
-            displacement_rate=1e-3,
-            latent_rate=3e-3,
-            cosine=True,
-            population_share=0.05,
-            residual_latents=True,
-            template_epochs=(1, 5, 20, 100),
-            loss=LossWeights(
-                surface_eikonal=0.0,
-                space_distance=0.0,
-                space_eikonal=0.0,
-                template_eikonal=10.0,
-                first_order=100.0,
-                latent=0.01,
-                centring=30.0,
-                ridge=0.02,
-            ),
-        ),
-    ),
-}
-
-
-def preset(name: str) -> Preset:
-    """The preset called ``name``.
-
-    Raises:
-        InputError: when there is none.
-    """
-    if name not in PRESETS:
-        raise InputError(f"there is no preset '{name}'; choose one of {', '.join(PRESETS)}")
-    return PRESETS[name]
-
-
 def to_json(config: Any) -> dict[str, Any]:
     """A frozen config as nested plain dictionaries."""
     return dataclasses.asdict(config)
 
 
-def from_json(kind: type[C], record: dict[str, Any], base: C | None = None, where: str = "") -> C:
-    """The inverse of :func:`to_json`; keys left out keep the value they have in ``base``.
+def from_json(base: C, record: dict[str, Any], where: str = "") -> C:
+    """``base`` with the settings of a record that :func:`to_json` gave; keys left out stay as they are.
 
     Raises:
-        InputError: for a key that ``kind`` does not have or a value of another type.
+        InputError: for a key that ``base`` does not have or a value of another type.
     """
-    hints = typing.get_type_hints(kind)
-    base = kind() if base is None else base
+    hints = typing.get_type_hints(type(base))
     if unknown := sorted(set(record) - set(hints)):
         raise InputError(f"unknown setting '{where}{unknown[0]}'; known are {', '.join(hints)}")
     changes = {
@@ -244,10 +184,11 @@ def from_json(kind: type[C], record: dict[str, Any], base: C | None = None, wher
 
 
 def _converted(kind: Any, value: Any, base: Any, where: str) -> Any:
-    if dataclasses.is_dataclass(kind) and isinstance(kind, type):
+    """``value`` as the setting that is now ``base``, which a nested config's type is taken from."""
+    if dataclasses.is_dataclass(base):
         if not isinstance(value, dict):
             raise InputError(f"setting '{where}' is {value!r}; expected a table")
-        return from_json(kind, value, base, f"{where}.")
+        return from_json(base, value, f"{where}.")
     if typing.get_origin(kind) is tuple:
         return tuple(value)
     if kind is float and isinstance(value, int) and not isinstance(value, bool):
@@ -267,4 +208,9 @@ def read_toml(path: Path, base: Preset) -> Preset:
         record = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise InputError(f"cannot read the settings in {path}: {error}") from error
-    return from_json(Preset, record, base)
+    if (model := record.get("model", base.model)) != base.model:
+        raise InputError(
+            f"the settings in {path} are for the model '{model}' and the preset is for '{base.model}'; "
+            "choose a preset of that model"
+        )
+    return from_json(base, record)

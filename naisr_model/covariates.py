@@ -7,8 +7,9 @@ centred number ``c_i`` of the paper, where 0 is the population centre.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -22,6 +23,18 @@ Values = Mapping[str, float]
 
 BANDWIDTH = 0.3
 """Of the kernel that makes the growth path, in standard deviations of the covariate that moves."""
+
+RANGE_SLACK = 1e-9
+"""Real units that a value may be out of range: to model units and back costs the last digits."""
+
+EDGE_OF_DATA = 0.98
+"""A combination lonelier than this share of the population is where there are no data."""
+
+NEIGHBOURS = 3
+"""How many shapes must be near a combination for it to be among the data."""
+
+LEAST_SPREAD = 0.05
+"""Combinations closer than this (standard deviations) to a shape are always among the data."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +66,11 @@ class Covariate:
     def restore(self, normalised: ArrayLike) -> NDArray[np.float64]:
         """The inverse of :meth:`normalise`."""
         return np.asarray(normalised, dtype=np.float64) * self.scale + self.centre
+
+    def contains(self, value: float) -> bool:
+        """Whether a real value is in the observed range."""
+        low, high = self.range
+        return low - RANGE_SLACK <= value <= high + RANGE_SLACK
 
     def parse(self, text: str) -> float:
         """Read ``text`` as a real value: a number, or the name of a level.
@@ -150,7 +168,42 @@ class Population:
     def normalised(self) -> NDArray[np.float64]:
         """Centred covariates of all rows, ``[n, N]``."""
         columns = [c.normalise(self.values[:, i]) for i, c in enumerate(self.covariates)]
-        return np.stack(columns, axis=1)
+        return np.stack(columns, axis=1) if columns else np.zeros((len(self), 0))
+
+    def keeping(self, names: Collection[str]) -> Population:
+        """The same shapes with some of their covariates."""
+        columns = [column for column, name in enumerate(self.names) if name in names]
+        covariates = tuple(self.covariates[column] for column in columns)
+        return replace(self, covariates=covariates, values=self.values[:, columns])
+
+    def contains(self, values: Values) -> bool:
+        """Whether every real value is in the observed range of its covariate, whoever is like that."""
+        return all(c.contains(values.get(c.name, c.centre)) for c in self.covariates)
+
+    def has_data_at(self, values: Values) -> bool:
+        """Whether people like ``values`` are among those behind the atlas.
+
+        Compares the distance to the :data:`NEIGHBOURS`-th nearest training row, over the continuous
+        covariates in units of their spread, with the same distance of the rows among themselves.
+
+        Args:
+            values: real values by name; a missing covariate is at its mean.
+        """
+        measured = [covariate for covariate in self.covariates if covariate.kind == "continuous"]
+        if not measured or np.count_nonzero(~self.held_out) <= NEIGHBOURS:
+            return True
+        rows, usual = self._neighbourhood
+        here = np.array([float(c.normalise(values.get(c.name, c.centre))) for c in measured])
+        return _loneliness(rows, here, NEIGHBOURS) <= usual
+
+    @cached_property
+    def _neighbourhood(self) -> tuple[NDArray[np.float64], float]:
+        """The training rows, and how far their neighbours are at the edge of the data."""
+        columns = [i for i, covariate in enumerate(self.covariates) if covariate.kind == "continuous"]
+        rows = self.normalised()[~self.held_out][:, columns]
+        # One more: every row is its own nearest. By hand, because SciPy would delay the first picture.
+        distances = [_loneliness(rows, row, NEIGHBOURS + 1) for row in rows]
+        return rows, max(float(np.quantile(distances, EDGE_OF_DATA)), LEAST_SPREAD)
 
     def to_json(self) -> dict[str, Any]:
         """A plain dictionary that :meth:`from_json` reads back."""
@@ -166,12 +219,12 @@ class Population:
     def from_json(cls, record: dict[str, Any]) -> Population:
         """The inverse of :meth:`to_json`."""
         covariates = tuple(Covariate.from_json(item) for item in record["covariates"])
-        values = np.asarray(record["values"], dtype=np.float64).reshape(-1, len(covariates))
+        values = np.asarray(record["values"], dtype=np.float64)
         return cls(
             covariates=covariates,
             subjects=tuple(map(str, record["subjects"])),
             visits=tuple(map(str, record["visits"])),
-            values=values,
+            values=values.reshape(len(record["subjects"]), len(covariates)),
             held_out=np.asarray(record["held_out"], dtype=bool),
         )
 
@@ -187,13 +240,15 @@ def complete(
     """
     known = {covariate.name for covariate in covariates}
     if unknown := sorted(set(values) - known):
-        raise InputError(f"unknown covariate '{unknown[0]}'; this atlas has {', '.join(sorted(known))}")
+        raise InputError(
+            f"unknown covariate '{unknown[0]}'; this atlas has {', '.join(sorted(known)) or 'none'}"
+        )
     for covariate in covariates:
         value = values.get(covariate.name, covariate.centre)
         low, high = covariate.range
         if not math.isfinite(value):
             raise InputError(f"covariate '{covariate.name}' is {value}; give a finite number")
-        if not extrapolate and not low - 1e-9 <= value <= high + 1e-9:
+        if not extrapolate and not covariate.contains(value):
             raise InputError(
                 f"covariate '{covariate.name}' is {value:g} {covariate.unit}; the atlas was trained on "
                 f"{low:g} to {high:g}; pass --extrapolate (extrapolate=True in Python) to go on"
@@ -236,3 +291,9 @@ def _local_mean(given: NDArray[np.float64], rows: NDArray[np.float64], place: fl
     ridge = np.diag([0.0, 1e-6 * weights.sum()])
     solution = np.linalg.solve((design.T * weights) @ design + ridge, (design.T * weights) @ rows)
     return np.asarray(solution[0])
+
+
+def _loneliness(rows: NDArray[np.float64], here: NDArray[np.float64], neighbours: int) -> float:
+    """Distance of ``here [N]`` to its so manieth nearest of ``rows [n, N]``."""
+    squared = np.square(rows - here).sum(axis=1)
+    return float(np.sqrt(np.partition(squared, neighbours - 1)[neighbours - 1]))

@@ -6,7 +6,9 @@ import dataclasses
 
 import trimesh
 
-from naisr_model.config import PRESETS, NetworkConfig, Preset, SirenConfig
+from naisr_model.config import Preset, SirenConfig
+from naisr_model.models.factory import preset
+from naisr_model.models.naisr.network import NaisrConfig
 
 
 def egg(age: float, sex: float) -> trimesh.Trimesh:
@@ -18,12 +20,11 @@ def egg(age: float, sex: float) -> trimesh.Trimesh:
 
 def egg_preset(epochs: int) -> Preset:
     """The demo recipe on networks small enough for a test."""
-    demo = PRESETS["demo"]
-    network = NetworkConfig(
+    network = NaisrConfig(
         latent=4, template=SirenConfig(32, 1, omega0=5.0), displacement=SirenConfig(16, 1, omega0=2.0)
     )
     training = dataclasses.replace(
-        demo.training,
+        preset("demo").training,
         epochs=epochs,
         batch_shapes=10,
         surface_points=64,
@@ -32,4 +33,4 @@ def egg_preset(epochs: int) -> Preset:
         template_rate=2e-3,
         displacement_rate=2e-3,
     )
-    return Preset(network, training)
+    return Preset("naisr", network, training)

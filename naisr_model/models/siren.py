@@ -148,7 +148,7 @@ class SirenStack(nn.Module):
         biases = (self.omega0 * self.hidden_bias).unbind()
         for layer, (weight, bias) in enumerate(zip(self._hidden_weights(), biases, strict=True)):
             linear = multiply(state, weight.mT, bias)
-            if layer == self.middle and conditions is not None:
+            if layer == self.middle and conditions is not None and self.skip_condition_weight.shape[-1]:
                 linear += self._skip(points, conditions)
             state = activation(linear)
         output = multiply(state, self.last_weight.mT, self.last_bias)

@@ -2,7 +2,7 @@
 
 The displacement fields g_i(p, c_i, z) of one code z are smooth in the point and in the covariate, and
 they add. So each is evaluated once, on a coarse lattice at a few values of c_i, and interpolated by
-cubic splines ever after. How coarse is measured on the network, see :data:`TOLERANCE`.
+cubic splines ever after. How coarse is measured on the networks, see :data:`TOLERANCE`.
 """
 
 from __future__ import annotations
@@ -22,8 +22,7 @@ from torch.nn import functional
 
 from naisr_model.errors import InputError
 from naisr_model.files import replacing
-from naisr_model.models.naisr.inference import PointFunction, effect_function
-from naisr_model.models.naisr.network import Naisr
+from naisr_model.models.base import AdditiveModel, PointFunction
 from naisr_model.progress import SILENT, Progress
 
 SPACINGS = (1 / 8, 1 / 16, 1 / 32)
@@ -107,7 +106,7 @@ class DisplacementTables:
 
 
 def tabulate(
-    network: Naisr,
+    model: AdditiveModel,
     ranges: Sequence[tuple[float, float]],
     latent: Tensor,
     bounds: NDArray[np.float64],
@@ -117,7 +116,7 @@ def tabulate(
     """Tabulate every g_i of a code.
 
     Args:
-        network: trained networks of 3D shapes.
+        model: trained, of 3D shapes.
         ranges: lowest and highest centred value of each covariate.
         latent: the code z, ``[L]``.
         bounds: lower and upper corner of the template's surface in model units, ``[2, 3]``.
@@ -126,7 +125,7 @@ def tabulate(
     Raises:
         Cancelled: when nobody waits for it any more.
     """
-    fields = [_field(network, index, latent, progress) for index in range(len(ranges))]
+    fields = [_field(model, index, latent, progress) for index in range(len(ranges))]
     region = _reachable(fields, ranges, bounds)
     jobs = list(zip(fields, ranges, strict=True))
     tables = tuple(_tabulated(*job, region) for job, _ in progress.over(jobs))
@@ -197,12 +196,12 @@ _Values = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float3
 """Points ``[n, 3]`` and centred values ``[K]`` of one covariate to displacements ``[K, 3, n]``."""
 
 
-def _field(network: Naisr, index: int, latent: Tensor, progress: Progress) -> _Values:
+def _field(model: AdditiveModel, index: int, latent: Tensor, progress: Progress) -> _Values:
     """g_i of the covariate ``index`` at one code."""
 
     def field(points: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float32]:
-        effect = effect_function(network, index, torch.as_tensor(values, dtype=torch.float32), latent)
-        located = torch.as_tensor(points, dtype=torch.float32, device=network.device)
+        effect = model.effect_function(index, torch.as_tensor(values, dtype=torch.float32), latent)
+        located = torch.as_tensor(points, dtype=torch.float32, device=model.device)
         pieces = located.split(max(1, CHUNK // (len(values) + 1)))
         return np.concatenate([chunk(effect, piece) for piece in pieces], axis=-1)
 

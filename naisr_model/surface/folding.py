@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from naisr_model.frames import Frame
-from naisr_model.models.naisr.calculus import deformation_determinant
-from naisr_model.models.naisr.network import Naisr
+from naisr_model.models.base import DeformableModel
+from naisr_model.models.derivatives import deformation_determinant
 from naisr_model.surface.fields import shape_field
 from naisr_model.surface.isosurface import isosurface
 from naisr_model.surface.lattice import Lattice
@@ -20,12 +20,12 @@ POINTS, SPREAD = 2000, 0.01
 
 
 def folded_shares(
-    network: Naisr, covariates: Tensor, latents: Tensor, resolution: int
+    model: DeformableModel, covariates: Tensor, latents: Tensor, resolution: int
 ) -> NDArray[np.float64]:
     """Share of the points near each surface where p -> p + d(p) folds, det(I + grad d) <= 0.
 
     Args:
-        network: trained networks of 3D shapes.
+        model: trained, of 3D shapes.
         covariates: centred, ``[shapes, N]``.
         latents: codes, ``[shapes, L]``.
         resolution: cells along a side of the box for the surfaces.
@@ -36,20 +36,20 @@ def folded_shares(
     lattice, rng = Lattice(resolution), np.random.default_rng(0)
     shares = []
     for vector, latent in zip(covariates, latents, strict=True):
-        values = evaluate_band(shape_field(network, vector, latent), lattice)
+        values = evaluate_band(shape_field(model, vector, latent), lattice)
         surface = isosurface(values, lattice, Frame((0.0,) * 3, 1.0))
         if not len(surface.faces):
             shares.append(np.nan)
             continue
         near = surface.sample(POINTS, seed=0) + rng.normal(0, SPREAD, (POINTS, 3))
-        shares.append(folded(network, near.astype(np.float32), vector, latent).mean())
+        shares.append(folded(model, near.astype(np.float32), vector, latent).mean())
     return np.array(shares)
 
 
 def folded(
-    network: Naisr, points: NDArray[np.float32], covariates: Tensor, latent: Tensor
+    model: DeformableModel, points: NDArray[np.float32], covariates: Tensor, latent: Tensor
 ) -> NDArray[np.bool_]:
     """Where p -> p + d(p) folds, ``[n]`` for ``points [n, dim]`` in model units."""
-    located = torch.from_numpy(points)[None].to(network.device).requires_grad_()
-    _, displacement = network(located, covariates[None], latent[None])
+    located = torch.from_numpy(points)[None].to(model.device).requires_grad_()
+    displacement = model.displacement(located, covariates[None], latent[None])
     return (deformation_determinant(displacement, located)[0] <= 0).numpy(force=True)

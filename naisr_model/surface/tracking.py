@@ -25,7 +25,7 @@ from torch import Tensor
 
 from naisr_model.covariates import Covariate, Values, complete, normalised_vector
 from naisr_model.frames import Frame
-from naisr_model.models.naisr.network import Naisr
+from naisr_model.models.base import DeformableModel
 from naisr_model.surface.displacements import SPACINGS, Displacements, DisplacementTables, jacobian, sample
 from naisr_model.surface.fields import template_field
 from naisr_model.surface.lattice import Lattice
@@ -194,7 +194,7 @@ class FadingTracker:
 
 
 def make_tracker(
-    network: Naisr,
+    model: DeformableModel,
     covariates: tuple[Covariate, ...],
     frame: Frame,
     template_mm: trimesh.Trimesh,
@@ -203,16 +203,16 @@ def make_tracker(
     """A tracker of the surface ``template_mm`` of T.
 
     Args:
-        network: whose T it is.
+        model: whose T it is.
         covariates: of the atlas.
         frame: millimetres to model units.
         template_mm: a mesh of the zero level set of T.
         tables: of the code in question.
     """
-    points = torch.as_tensor(frame.to_model(template_mm.vertices), dtype=torch.float32, device=network.device)
+    points = torch.as_tensor(frame.to_model(template_mm.vertices), dtype=torch.float32, device=model.device)
     located = points[None].requires_grad_()
-    (slopes,) = torch.autograd.grad(network.template(located).sum(), located)
-    values = continued(evaluate_band(template_field(network), TEMPLATE_LATTICE), TEMPLATE_LATTICE)
+    (slopes,) = torch.autograd.grad(model.template(located).sum(), located)
+    values = continued(evaluate_band(template_field(model), TEMPLATE_LATTICE), TEMPLATE_LATTICE)
     return CodeTracker(
         covariates,
         frame,

@@ -38,6 +38,24 @@ def test_a_checkpoint_comes_back_as_it_was(egg_atlas, tmp_path):
     assert len(again.latents) == np.sum(~again.population.held_out)
 
 
+def with_preset(source: Path, target: Path, **changes: str | None) -> Path:
+    """``source`` whose preset's record has other entries, or none where the change is None."""
+    record = json.loads(metadata(source)["record"])
+    preset = {**record["preset"], **changes}
+    record["preset"] = {name: value for name, value in preset.items() if value is not None}
+    return rewritten(source, target, record=json.dumps(record))
+
+
+def test_a_file_from_before_there_were_other_models_is_naisr_s(egg_atlas, tmp_path):
+    old = load(with_preset(egg_atlas, tmp_path / "old.safetensors", model=None))
+    assert old.preset == load(egg_atlas).preset
+
+
+def test_an_unknown_model_is_named(egg_atlas, tmp_path):
+    with pytest.raises(InputError, match=r"model 'cubes', which this program does not know; update"):
+        load(with_preset(egg_atlas, tmp_path / "new.safetensors", model="cubes"))
+
+
 def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(InputError, match=r"no atlas at .*nowhere"):
         load(tmp_path / "nowhere.safetensors")

@@ -5,11 +5,13 @@ import dataclasses
 import numpy as np
 import pytest
 
-from naisr_model.config import PRESETS, Preset, from_json, preset, read_toml, to_json
+from naisr_model.config import read_toml, to_json
 from naisr_model.covariates import Covariate, Population, complete
 from naisr_model.errors import InputError
 from naisr_model.files import replacing
 from naisr_model.frames import Frame, enclosing_frame
+from naisr_model.models.factory import preset, presets, read_preset
+from naisr_model.models.naisr.network import NaisrConfig
 
 AGE = Covariate("age", "months", "continuous", centre=100.0, scale=50.0, range=(1.0, 233.0))
 SEX = Covariate("sex", "", "binary", 0.0, 1.0, (-1.0, 1.0), ("F", "M"))
@@ -47,6 +49,41 @@ def test_missing_covariates_are_at_the_centre_and_others_are_checked():
         complete((AGE, SEX), {"age": float("nan")}, extrapolate=True)
 
 
+def test_in_range_is_said_once():
+    assert AGE.contains(1.0) and AGE.contains(233.0 + 1e-12) and not AGE.contains(234.0)
+    assert not AGE.contains(float("nan"))
+
+
+@pytest.fixture
+def children() -> Population:
+    """Thirty of them, twice as heavy in hundred months; the last is held out."""
+    ages = np.linspace(1, 200, 30)
+    weight = Covariate("weight", "kg", "continuous", 30.0, 15.0, (5.0, 60.0))
+    values = np.stack([ages, 5 + ages / 4, np.resize([-1.0, 1.0], 30)], axis=1)
+    names = tuple(f"S{number}" for number in range(30))
+    return Population((AGE, weight, SEX), names, names, values, np.arange(30) == 29)
+
+
+def test_where_there_are_data_and_what_is_in_range_are_two_questions(children):
+    assert children.has_data_at({"age": 100, "weight": 30}) and children.has_data_at({})
+    assert children.has_data_at({"age": 100, "weight": 30, "sex": 0})  # between levels is a mixture, no gap
+    stranger = {"age": 12.0, "weight": 45.0}
+    assert children.contains(stranger) and not children.has_data_at(stranger)
+    assert not children.contains({"age": 12.0, "weight": 75.0})
+
+
+def test_a_population_with_fewer_covariates_is_the_same_people(children):
+    some = children.keeping({"sex", "age"})
+    assert some.names == ("age", "sex") and some.subjects == children.subjects
+    assert some.values.tolist() == children.values[:, [0, 2]].tolist()
+    none = children.keeping(())
+    assert none.normalised().shape == (30, 0) and none.centre == {} and none.row(3) == {}
+    assert none.contains({}) and none.has_data_at({})
+    assert Population.from_json(none.to_json()).values.shape == (30, 0)
+    with pytest.raises(InputError, match="'age'; this atlas has none"):
+        complete(none.covariates, {"age": 3})
+
+
 def test_a_population_survives_json():
     population = Population(
         (AGE, SEX), ("a", "b"), ("1", "1"), np.array([[12.0, -1], [120, 1]]), np.array([False, True])
@@ -58,15 +95,16 @@ def test_a_population_survives_json():
     assert again.normalised()[0] == pytest.approx([(12 - 100) / 50, -1])
 
 
-@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize("name", presets())
 def test_presets_survive_json(name):
-    assert from_json(Preset, to_json(preset(name))) == preset(name)
+    assert read_preset(to_json(preset(name))) == preset(name)
 
 
 def test_settings_from_a_file_change_only_what_they_name(tmp_path):
     path = tmp_path / "settings.toml"
     path.write_text("[training]\nepochs = 7\n[training.loss]\nfolding = 1\n[network.template]\nwidth = 64\n")
     read = read_toml(path, preset("demo"))
+    assert isinstance(read.network, NaisrConfig)
     assert (read.training.epochs, read.training.loss.folding, read.network.template.width) == (7, 1.0, 64)
     changed_back = dataclasses.replace(
         read.training, epochs=preset("demo").training.epochs, loss=preset("demo").training.loss

@@ -22,7 +22,7 @@ from torch import Tensor
 
 from naisr_model.learning.fitting.prior import Prior, conditional
 from naisr_model.learning.fitting.sensitivity import sensitivity
-from naisr_model.models.naisr.network import Naisr
+from naisr_model.models.base import ShapeModel
 from naisr_model.progress import SILENT, Progress
 
 Vector = NDArray[np.float64]
@@ -54,14 +54,14 @@ class Problem:
     """One shape's unknowns.
 
     Attributes:
-        network: trained networks, not changed.
+        model: trained, not changed.
         prior: of codes and covariates.
         fixed: centred values of the covariates that do not move, NaN for the free ones, ``[N]``.
         independent: M, how many independent measurements the surface counts for.
         tolerated: k, see :data:`TOLERATED`.
     """
 
-    network: Naisr
+    model: ShapeModel
     prior: Prior
     fixed: Vector
     independent: float
@@ -125,7 +125,7 @@ def evaluate(problem: Problem, sample: Sample, parameters: Vector) -> Rows:
     """The only place where the networks are evaluated."""
     covariates = len(problem.fixed)
     vectors = [torch.as_tensor(part).to(sample.points) for part in problem.unpack(parameters)]
-    local = sensitivity(problem.network, sample.points, *vectors)
+    local = sensitivity(problem.model, sample.points, *vectors)
     scale = 1 / (1 + sample.distances.abs() / REACH)
     residuals = (local.distances - sample.distances) * scale
     by_all = (local.jacobian * scale[:, None]).double().numpy(force=True)

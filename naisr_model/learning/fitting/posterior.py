@@ -22,7 +22,7 @@ from naisr_model.learning.fitting.least_squares import Problem, Sample, evaluate
 from naisr_model.learning.fitting.prior import Prior
 from naisr_model.learning.fitting.search import FOLLOWED_POINTS, INDEPENDENT_POINTS, ShapeFit, draw_sample
 from naisr_model.learning.fitting.target import Target
-from naisr_model.models.naisr.network import Naisr
+from naisr_model.models.base import ShapeModel
 
 Vector = NDArray[np.float64]
 
@@ -64,11 +64,11 @@ class Posterior:
     noise: float
 
 
-def posterior_of(network: Naisr, target: Target, prior: Prior, fit: ShapeFit) -> Posterior:
+def posterior_of(model: ShapeModel, target: Target, prior: Prior, fit: ShapeFit) -> Posterior:
     """The Gaussian about a fit to ``target``."""
     fixed = fit.covariates.copy()
     fixed[fit.free] = np.nan
-    problem = Problem(network, prior, fixed, INDEPENDENT_POINTS)
+    problem = Problem(model, prior, fixed, INDEPENDENT_POINTS)
     parameters = problem.pack(fit.covariates, fit.latent)
     rows = evaluate(problem, draw_sample(target, POINTS, SEED), parameters)
     # Of a part, what was not seen is no surer than the code.

@@ -49,7 +49,7 @@ class Prior:
 def prior_of(population: Population, latents: NDArray[np.float32]) -> Prior:
     """The prior of a population and its training codes ``[n_train, L]``."""
     rows = population.normalised()[~population.held_out]
-    bounds = np.array([c.normalise(c.range) for c in population.covariates])
+    bounds = np.array([c.normalise(c.range) for c in population.covariates]).reshape(-1, 2)
     subjects = np.array(population.subjects)[~population.held_out]
     return Prior(
         code_root=_root(latents.astype(np.float64)),

@@ -30,7 +30,7 @@ from naisr_model.learning.fitting.least_squares import (
 from naisr_model.learning.fitting.prior import Prior, Told, believed
 from naisr_model.learning.fitting.target import Target
 from naisr_model.learning.training.objective import Batch, latent_term, reconstruction_terms
-from naisr_model.models.naisr.network import Naisr
+from naisr_model.models.base import ShapeModel
 from naisr_model.progress import SILENT, Progress
 
 Vector = NDArray[np.float64]
@@ -80,7 +80,7 @@ Draw = Callable[[np.random.Generator], Batch]
 
 
 def fit_latents(
-    network: Naisr,
+    model: ShapeModel,
     draw: Draw,
     covariates: Tensor,
     config: FitConfig,
@@ -93,7 +93,7 @@ def fit_latents(
     Shapes are independent of each other; fitting many at once only shares the matrix products.
 
     Args:
-        network: trained networks; they are not changed.
+        model: trained, not changed.
         draw: gives the samples of one step.
         covariates: centred, ``[shapes, N]``.
         config: steps, rate and seed.
@@ -106,10 +106,10 @@ def fit_latents(
     Raises:
         Cancelled: when nobody waits for it any more.
     """
-    latents = covariates.new_zeros(len(covariates), network.config.latent).requires_grad_()
+    latents = covariates.new_zeros(len(covariates), model.config.latent).requires_grad_()
     optimiser = torch.optim.Adam([latents], lr=config.rate)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, config.steps)
-    frozen = [parameter for parameter in network.parameters() if parameter.requires_grad]
+    frozen = [parameter for parameter in model.parameters() if parameter.requires_grad]
     for parameter in frozen:
         parameter.requires_grad_(False)
     try:
@@ -117,7 +117,7 @@ def fit_latents(
             batch = draw(np.random.default_rng([config.seed, step]))
             optimiser.zero_grad()
             # Means over the shapes; multiplying by their number makes each fit its own problem.
-            terms = reconstruction_terms(network, batch, covariates, latents, weights)
+            terms = reconstruction_terms(model, batch, covariates, latents, weights)
             terms |= latent_term(latents, weights)
             (len(latents) * torch.stack(list(terms.values())).sum()).backward()
             optimiser.step()
@@ -154,7 +154,7 @@ class ShapeFit:
 
 
 def fit_shape(
-    network: Naisr,
+    model: ShapeModel,
     target: Target,
     prior: Prior,
     known: Vector,
@@ -168,7 +168,7 @@ def fit_shape(
     nothing between them, so each is fitted.
 
     Args:
-        network: trained networks, not changed.
+        model: trained, not changed.
         target: samples of the shape.
         prior: of the training population.
         known: centred covariates, NaN where unknown, ``[N]``.
@@ -183,11 +183,11 @@ def fit_shape(
     """
     samples = [draw_sample(target, points, stage) for stage, points in enumerate(STAGES)]
     if not np.isnan(known).any():
-        problem = Problem(network, prior, known, FOLLOWED_POINTS)
+        problem = Problem(model, prior, known, FOLLOWED_POINTS)
         problems = [dataclasses.replace(problem, tolerated=tolerated) for tolerated in DRAWN_IN]
         descent = _descend(problems, samples, np.zeros(len(prior.code_root)), progress)
         return [_result(problem, descent, descent.rows.noise, samples[0])]
-    begun = _begun(network, target, prior, _combinations(known, binary), progress.part(0, 1 / 3))
+    begun = _begun(model, target, prior, _combinations(known, binary), progress.part(0, 1 / 3))
     settled: list[Explanation] = []
     pursued = _different(begun)
     for (followed, descent), piece in progress.part(1 / 3, 2 / 3).over(pursued):
@@ -197,14 +197,14 @@ def fit_shape(
     fits = sorted(
         (_result(*one, noise, samples[0]) for one in _different(settled)), key=lambda fit: fit.surprise
     )
-    best = _followed(network, prior, fits[0], samples[-1], progress.part(2 / 3, 1))
+    best = _followed(model, prior, fits[0], samples[-1], progress.part(2 / 3, 1))
     asked = len(fits) * (1 + len(SHARES) * len(fits[0].free)) * len(samples[0].points)
     spent = sum(descent.evaluations for _, descent in begun + settled) + best.evaluations + asked
     return [dataclasses.replace(best, evaluations=spent), *fits[1:]]
 
 
 def _begun(
-    network: Naisr,
+    model: ShapeModel,
     target: Target,
     prior: Prior,
     combinations: Sequence[Vector],
@@ -218,7 +218,7 @@ def _begun(
     placing, coarse = draw_sample(target, PLACING_POINTS, 0), draw_sample(target, STAGES[0], 0)
     found: list[Explanation] = []
     for fixed, piece in progress.over(combinations):
-        problem = Problem(network, prior, fixed, FOLLOWED_POINTS)
+        problem = Problem(model, prior, fixed, FOLLOWED_POINTS)
         for start in _starts(problem, placing):
             found.append((problem, _descend([problem], [coarse], start, piece.quiet)))
     return found
@@ -331,14 +331,14 @@ def _told(problem: Problem, sample: Sample, parameters: Vector, noise: float) ->
 
 
 def _followed(
-    network: Naisr,
+    model: ShapeModel,
     prior: Prior,
     fit: ShapeFit,
     sample: Sample,
     progress: Progress,
 ) -> ShapeFit:
     """The code moved closer to the surface, the covariates staying where they were inferred."""
-    problem = Problem(network, prior, fit.covariates, FOLLOWED_POINTS)
+    problem = Problem(model, prior, fit.covariates, FOLLOWED_POINTS)
     start = problem.pack(fit.covariates, fit.latent)
     descent = _descend([problem], [sample], start, progress)
     latent = problem.unpack(descent.parameters)[1]

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from naisr_model.models.naisr.network import Naisr
+from naisr_model.models.base import ShapeModel
 from naisr_model.surface.fields import LEAST_SLOPE
 
 CHUNK = 512
@@ -30,28 +30,30 @@ class Sensitivity(NamedTuple):
     jacobian: Tensor
 
 
-def sensitivity(network: Naisr, points: Tensor, covariates: Tensor, latent: Tensor) -> Sensitivity:
+def sensitivity(model: ShapeModel, points: Tensor, covariates: Tensor, latent: Tensor) -> Sensitivity:
     """Distances of points to one shape and their derivatives by its parameters.
 
     With r = Phi / |grad Phi|, dr/dtheta = (dPhi/dtheta) / |grad Phi|: what the slope itself
     contributes is multiplied by r and vanishes on the surface.
 
     Args:
-        network: trained networks.
+        model: trained.
         points: ``[n, dim]``.
         covariates: centred, ``[N]``.
         latent: ``[L]``.
     """
-    parts = [_sensitivity(network, chunk, covariates, latent) for chunk in points.split(CHUNK)]
+    parts = [_sensitivity(model, chunk, covariates, latent) for chunk in points.split(CHUNK)]
     return Sensitivity(*(torch.cat(columns) for columns in zip(*parts, strict=True)))
 
 
-def _sensitivity(network: Naisr, points: Tensor, covariates: Tensor, latent: Tensor) -> Sensitivity:
+def _sensitivity(model: ShapeModel, points: Tensor, covariates: Tensor, latent: Tensor) -> Sensitivity:
     own = [points[:, None], *(vector.expand(len(points), -1) for vector in (covariates, latent))]
     own = [tensor.detach().clone().requires_grad_() for tensor in own]
     with torch.enable_grad():
-        values, _ = network(*own)
-        slopes, by_covariates, by_latent = torch.autograd.grad(values.sum(), own)
+        values = model(*own)
+        # A model may have no use for covariates.
+        derivatives = torch.autograd.grad(values.sum(), own, materialize_grads=True)
+    slopes, by_covariates, by_latent = derivatives
     steepness = slopes.norm(dim=-1).clamp(min=LEAST_SLOPE)
     jacobian = torch.cat([by_covariates, by_latent], dim=-1) / steepness
     return Sensitivity(values.detach()[:, 0] / steepness[:, 0], jacobian)

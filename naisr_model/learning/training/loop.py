@@ -28,8 +28,9 @@ from naisr_model.errors import Cancelled, InputError
 from naisr_model.files import replacing
 from naisr_model.learning.training.objective import Batch, latent_term, population_terms, reconstruction_terms
 from naisr_model.learning.training.residual import covariate_basis
+from naisr_model.models.base import AdditiveModel, DeformableModel, ShapeModel, deformable
 from naisr_model.models.devices import usable_device
-from naisr_model.models.naisr.network import Naisr
+from naisr_model.models.factory import build, model_class
 from naisr_model.progress import SILENT, Progress
 from naisr_model.surface.fields import template_field
 from naisr_model.surface.folding import folded_shares
@@ -81,7 +82,7 @@ class _Task:
         out: the checkpoint to write.
         budget_s: seconds the training may take; infinite when it is bounded by epochs alone.
         rows: the store's training rows, ``[n]``.
-        covariates: centred, of those rows, ``[n, N]``.
+        covariates: centred, of those rows, ``[n, N]``; those that the model depends on.
         basis: orthonormal columns that are taken out of the codes, ``[n, K]``; none when they are free.
         binary: columns of binary covariates.
     """
@@ -126,7 +127,7 @@ class _State:
     ``best`` is the lowest running mean of the loss so far, ``running`` the present one.
     """
 
-    network: Naisr
+    model: ShapeModel
     codes: nn.Parameter
     optimiser: torch.optim.Adam
     iteration: int = 0
@@ -137,13 +138,13 @@ class _State:
     def to_dict(self) -> dict[str, Any]:
         numbers = {name: getattr(self, name) for name in ("iteration", "seconds", "running", "best")}
         return numbers | {
-            "network": self.network.state_dict(),
+            "network": self.model.state_dict(),
             "codes": self.codes.detach(),
             "optimiser": self.optimiser.state_dict(),
         }
 
     def load(self, record: dict[str, Any]) -> None:
-        self.network.load_state_dict(record["network"])
+        self.model.load_state_dict(record["network"])
         self.codes.data.copy_(record["codes"])
         self.optimiser.load_state_dict(record["optimiser"])
         for name in ("iteration", "seconds", "running", "best"):
@@ -213,7 +214,7 @@ def train(
             if report is not None:
                 report(told)
     _save(state, task)
-    return _save(state, task, {"folded_share": _folded_share(state, task)})
+    return _save(state, task, _measured(state, task))
 
 
 def _task(store: SampleStore, preset: Preset, out: Path, budget_s: float, device: str) -> _Task:
@@ -222,10 +223,12 @@ def _task(store: SampleStore, preset: Preset, out: Path, budget_s: float, device
             f"the preset is for {preset.network.dim}D shapes and the store holds {store.frame.dim}D ones; "
             f"choose another preset"
         )
+    _check(preset)
     usable_device(device)
-    rows = np.flatnonzero(~store.population.held_out)
-    normalised = store.population.normalised()[rows]
-    binary = tuple(i for i, c in enumerate(store.population.covariates) if c.kind == "binary")
+    population = model_class(preset.model).relevant(store.population)
+    rows = np.flatnonzero(~population.held_out)
+    normalised = population.normalised()[rows]
+    binary = tuple(i for i, c in enumerate(population.covariates) if c.kind == "binary")
     basis = covariate_basis(normalised, binary) if preset.training.residual_latents else normalised[:, :0]
     return _Task(
         store=store,
@@ -239,21 +242,36 @@ def _task(store: SampleStore, preset: Preset, out: Path, budget_s: float, device
     )
 
 
+def _check(preset: Preset) -> None:
+    """Refuse settings that say something of covariates or of a template to a model without them."""
+    config, model = preset.training, model_class(preset.model)
+    can, loss = model.capabilities, config.loss
+    wanted = (
+        ("population_share", config.population_share, can.evolvable),
+        ("residual_latents", config.residual_latents, can.evolvable),
+        ("template_epochs", config.template_epochs, can.has_template),
+        ("loss.template_eikonal", loss.template_eikonal, can.has_template),
+        ("loss.folding", loss.folding, can.deformable),
+        ("loss.centring", loss.centring, issubclass(model, AdditiveModel)),
+        ("loss.ridge", loss.ridge, issubclass(model, AdditiveModel)),
+    )
+    for name, value, is_possible in wanted:
+        if value and not is_possible:
+            raise InputError(
+                f"the setting 'training.{name}' is {value}, but {model.title} has no use for it; leave it out"
+            )
+
+
 def _initial_state(preset: Preset, shapes: int, covariates: int, device: str) -> _State:
     config = preset.training
     with torch.random.fork_rng():
         torch.manual_seed(config.seed)
-        network = Naisr(preset.network, covariates).to(device)
+        model = build(preset, covariates).to(device)
         codes = torch.randn(shapes, preset.network.latent) * config.loss.latent_sigma
     parameter = nn.Parameter(codes.to(device))
-    optimiser = torch.optim.Adam(
-        [
-            {"params": list(network.template_network.parameters())},
-            {"params": list(network.displacement_networks.parameters())},
-            {"params": [parameter]},
-        ]
-    )
-    return _State(network, parameter, optimiser)
+    rated = model.rated_parameters() | {"latent_rate": [parameter]}
+    optimiser = torch.optim.Adam([{"params": own, "setting": name} for name, own in rated.items()])
+    return _State(model, parameter, optimiser)
 
 
 def _batch_indices(task: _Task, iteration: int) -> NDArray[np.intp]:
@@ -282,10 +300,10 @@ def _accumulate_gradients(state: _State, task: _Task) -> dict[str, float]:
         codes = codes * 0
     # The codes' gradient is gathered over the parts of the batch and sent through the projection once.
     leaf = codes.detach().requires_grad_()
-    sums = accumulate_reconstruction(state.network, batch, covariates, leaf, config.loss)
+    sums = accumulate_reconstruction(state.model, batch, covariates, leaf, config.loss)
     _accumulate(latent_term(leaf, config.loss), 1.0, sums)
     few = slice(0, POPULATION_SHAPES)
-    held = population_terms(state.network, batch.space_points[few], covariates[few], task.binary, config.loss)
+    held = population_terms(state.model, batch.space_points[few], covariates[few], task.binary, config.loss)
     _accumulate(held, 1.0, sums)
     assert leaf.grad is not None
     codes.backward(leaf.grad)
@@ -293,12 +311,12 @@ def _accumulate_gradients(state: _State, task: _Task) -> dict[str, float]:
 
 
 def accumulate_reconstruction(
-    network: Naisr, batch: Batch, covariates: Tensor, latents: Tensor, weights: LossWeights
+    model: ShapeModel, batch: Batch, covariates: Tensor, latents: Tensor, weights: LossWeights
 ) -> dict[str, float]:
     """Add the gradients of L_on and L_off to the parameters, a part of the batch at a time.
 
     Args:
-        network: the networks.
+        model: is trained.
         batch: samples of some shapes.
         covariates: of those shapes, centred, ``[shapes, N]``.
         latents: their codes, ``[shapes, L]``.
@@ -312,7 +330,7 @@ def accumulate_reconstruction(
     shapes_at_once = max(1, POINTS_AT_ONCE // count)
     for start in range(0, shapes, shapes_at_once):
         part = slice(start, min(start + shapes_at_once, shapes))
-        terms = reconstruction_terms(network, batch.narrow(part), covariates[part], latents[part], weights)
+        terms = reconstruction_terms(model, batch.narrow(part), covariates[part], latents[part], weights)
         _accumulate(terms, (part.stop - part.start) / shapes, sums)
     return sums
 
@@ -332,9 +350,8 @@ def residual_latents(codes: Tensor, basis: Tensor) -> Tensor:
 
 def _set_rates(state: _State, config: TrainingConfig, share: float) -> None:
     factor = 0.5 * (1 + math.cos(math.pi * share)) if config.cosine else 1.0
-    rates = (config.template_rate, config.displacement_rate, config.latent_rate)
-    for group, rate in zip(state.optimiser.param_groups, rates, strict=True):
-        group["lr"] = rate * factor
+    for group in state.optimiser.param_groups:
+        group["lr"] = getattr(config, group["setting"]) * factor
 
 
 def _accumulate(terms: dict[str, Tensor], share: float, sums: dict[str, float]) -> None:
@@ -354,11 +371,11 @@ def _report(state: _State, task: _Task, losses: dict[str, float], seconds_each: 
 
 def _divergence_message(total: float, state: _State, task: _Task) -> str:
     config, out = task.config, task.out
+    lower = [f"a {name} below {getattr(config, name):g}" for name in state.model.rated_parameters()]
     kept = f"the last good state is in {out}" if out.exists() else "no good state had been saved"
     return (
         f"the training broke down at iteration {state.iteration} (loss {total:.3g}); {kept}; try again "
-        f"under another name with a template_rate below {config.template_rate:g}, a displacement_rate "
-        f"below {config.displacement_rate:g} or a lower omega0"
+        f"under another name with {', '.join(lower)} or a lower omega0"
     )
 
 
@@ -368,19 +385,26 @@ def _keep_template(state: _State, task: _Task) -> None:
     if rest or epoch not in task.config.template_epochs or task.store.frame.dim != 3:
         return
     lattice = Lattice(64)
-    mesh = isosurface(evaluate_band(template_field(state.network), lattice), lattice, task.store.frame)
+    mesh = isosurface(
+        evaluate_band(template_field(deformable(state.model)), lattice), lattice, task.store.frame
+    )
     if len(mesh.faces):
         with replacing(task.folder / "templates" / f"epoch_{epoch:05d}.ply") as temporary:
             mesh.export(temporary)
 
 
-def _folded_share(state: _State, task: _Task) -> float:
+def _measured(state: _State, task: _Task) -> dict[str, float]:
+    """Of surfaces that a template is deformed to, the share that folds."""
+    if task.store.frame.dim != 3 or not isinstance(state.model, DeformableModel):
+        return {}
+    return {"folded_share": _folded_share(state.model, state, task)}
+
+
+def _folded_share(model: DeformableModel, state: _State, task: _Task) -> float:
     """Mean share of folded points near the surfaces of some training shapes, with their codes."""
-    if task.store.frame.dim != 3:
-        return math.nan
     some = np.random.default_rng(0).permutation(len(task.rows))[:FOLDING_SHAPES]
     latents = residual_latents(state.codes.detach(), task.basis)[some]
-    return float(np.mean(folded_shares(state.network, task.covariates[some], latents, resolution=64)))
+    return float(np.mean(folded_shares(model, task.covariates[some], latents, resolution=64)))
 
 
 def _save(state: _State, task: _Task, measured: dict[str, float] | None = None) -> Checkpoint:
@@ -388,7 +412,7 @@ def _save(state: _State, task: _Task, measured: dict[str, float] | None = None) 
     checkpoint = Checkpoint(
         name=store.name,
         preset=task.preset,
-        weights={name: tensor.clone() for name, tensor in state.network.state_dict().items()},
+        weights={name: tensor.clone() for name, tensor in state.model.state_dict().items()},
         latents=residual_latents(state.codes.detach(), task.basis).numpy(force=True),
         population=store.population,
         frame=store.frame,

@@ -9,8 +9,8 @@ from torch import Tensor
 
 from naisr_model.config import LossWeights
 from naisr_model.learning.training import losses
-from naisr_model.models.naisr.calculus import deformation_determinant, linearised
-from naisr_model.models.naisr.network import Naisr
+from naisr_model.models.base import ShapeModel, additive, deformable
+from naisr_model.models.derivatives import deformation_determinant
 
 
 class Batch(NamedTuple):
@@ -39,15 +39,18 @@ class Batch(NamedTuple):
 
 
 def reconstruction_terms(
-    network: Naisr, batch: Batch, covariates: Tensor, latents: Tensor, weights: LossWeights
+    model: ShapeModel, batch: Batch, covariates: Tensor, latents: Tensor, weights: LossWeights
 ) -> dict[str, Tensor]:
     """The weighted terms L_on and L_off of a batch, and the folding term where it is asked for.
 
     On- and off-surface points go through the networks together, so that they are evaluated once.
+
+    Raises:
+        InputError: for the folding of a model that deforms no template.
     """
     on = batch.surface_points.shape[1]
     points = torch.cat([batch.surface_points, batch.space_points], dim=1)
-    values, slope, template_slope, _ = linearised(network, points, covariates, latents)
+    values, slope, template_slope = model.linearised(points, covariates, latents)
     terms = {
         "surface_distance": weights.surface_distance * losses.distance(values[:, :on], 0.0),
         "surface_normal": weights.surface_normal * losses.normal(slope[:, :on], batch.surface_normals),
@@ -59,6 +62,7 @@ def reconstruction_terms(
     if weights.space_eikonal:
         terms["space_eikonal"] = weights.space_eikonal * losses.eikonal(slope[:, on:])
     if weights.template_eikonal:
+        assert template_slope is not None  # no other model is trained with this term
         terms["template_eikonal"] = weights.template_eikonal * losses.eikonal(template_slope)
     if weights.first_order:
         terms["first_order"] = weights.first_order * losses.first_order_distance(
@@ -66,33 +70,36 @@ def reconstruction_terms(
         )
     if weights.folding:
         located = batch.surface_points.requires_grad_()
-        displacement = network.displacements(located, covariates, latents).sum(dim=0)
+        displacement = deformable(model).displacement(located, covariates, latents)
         determinant = deformation_determinant(displacement, located)
         terms["folding"] = weights.folding * losses.folding(determinant)
     return terms
 
 
 def population_terms(
-    network: Naisr, points: Tensor, covariates: Tensor, binary: tuple[int, ...], weights: LossWeights
+    model: ShapeModel, points: Tensor, covariates: Tensor, binary: tuple[int, ...], weights: LossWeights
 ) -> dict[str, Tensor]:
     """What settles the effects where the data leave them open, at z = 0.
 
     Args:
-        network: the networks.
+        model: is trained.
         points: ``[shapes, n, dim]``.
         covariates: of those shapes, ``[shapes, N]``.
         binary: columns of ``covariates`` that only ever are -1 or +1.
         weights: ``centring`` and ``ridge`` are used.
+
+    Raises:
+        InputError: for a term of displacements that the model does not have.
     """
-    latents = covariates.new_zeros(len(covariates), network.config.latent)
+    latents = covariates.new_zeros(len(covariates), model.config.latent)
     terms: dict[str, Tensor] = {}
     if weights.ridge:
-        displacements = network.displacements(points, covariates, latents)
+        displacements = additive(model).displacements(points, covariates, latents)
         terms["ridge"] = weights.ridge * losses.ridge(displacements)
     if weights.centring and binary:
         levels = torch.cat([-torch.ones_like(covariates), torch.ones_like(covariates)])
-        both = network.displacements(points.repeat(2, 1, 1), levels, latents.repeat(2, 1))[list(binary)]
-        terms["centring"] = weights.centring * losses.centring(*both.chunk(2, dim=1))
+        both = additive(model).displacements(points.repeat(2, 1, 1), levels, latents.repeat(2, 1))
+        terms["centring"] = weights.centring * losses.centring(*both[list(binary)].chunk(2, dim=1))
     return terms
 
 

@@ -7,51 +7,29 @@ is left out: Phi_i is Phi with every other covariate at 0, and T is Phi with all
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import torch
 from torch import Tensor
 
-from naisr_model.models.naisr.network import Naisr
+from naisr_model.models.base import PointFunction
 from naisr_model.models.products import multiply
 from naisr_model.models.siren import SirenStack
 
-PointFunction = Callable[[Tensor], Tensor]
-"""Of points ``[n, dim]`` in model units, on the device and in the precision of the network."""
-
-
-def shape_function(network: Naisr, covariates: Tensor, latent: Tensor) -> PointFunction:
-    """Phi(p, c, z) = T(p + sum_i g_i(p, c_i, z)) of one shape, ``[n]``.
-
-    Args:
-        network: T and f_1 ... f_N.
-        covariates: c, centred, ``[N]``.
-        latent: z, ``[L]``.
-    """
-    displacement = displacement_function(network, covariates, latent)
-
-    @torch.inference_mode()
-    def shape(points: Tensor) -> Tensor:
-        return network.template((points + displacement(points))[None])[0]
-
-    return shape
-
 
 @torch.inference_mode()
-def displacement_function(network: Naisr, covariates: Tensor, latent: Tensor) -> PointFunction:
+def displacement_function(stack: SirenStack, covariates: Tensor, latent: Tensor) -> PointFunction:
     """sum_i g_i(p, c_i, z) = sum_i f_i(p, c_i, z) - f_i(p, 0, z) of one shape, ``[n, dim]``.
 
     Args:
-        network: T and f_1 ... f_N.
+        stack: f_1 ... f_N.
         covariates: c, centred, ``[N]``.
         latent: z, ``[L]``.
     """
-    active = covariates.nonzero()[:, 0].to(network.device)
+    active = covariates.nonzero()[:, 0].to(stack.last_bias.device)
     if not len(active):
         return torch.zeros_like
-    values = covariates.to(network.device)[active]
+    values = covariates.to(active.device)[active]
     levels = torch.stack([values, torch.zeros_like(values)], dim=1)
-    states, last = _last_states(network.displacement_networks, active, levels, latent)
+    states, last = _last_states(stack, active, levels, latent)
 
     @torch.inference_mode()
     def displacement(points: Tensor) -> Tensor:
@@ -62,18 +40,18 @@ def displacement_function(network: Naisr, covariates: Tensor, latent: Tensor) ->
 
 
 @torch.inference_mode()
-def effect_function(network: Naisr, index: int, values: Tensor, latent: Tensor) -> PointFunction:
+def effect_function(stack: SirenStack, index: int, values: Tensor, latent: Tensor) -> PointFunction:
     """g_i(p, c_i, z) of one covariate at several of its values, ``[K, n, dim]``.
 
     Args:
-        network: T and f_1 ... f_N.
+        stack: f_1 ... f_N.
         index: i.
         values: of c_i, centred, ``[K]``.
         latent: z, ``[L]``.
     """
-    levels = torch.cat([values, values.new_zeros(1)])[None].to(network.device)
-    one = torch.tensor([index], device=network.device)
-    states, last = _last_states(network.displacement_networks, one, levels, latent)
+    one = torch.tensor([index], device=stack.last_bias.device)
+    levels = torch.cat([values, values.new_zeros(1)])[None].to(one.device)
+    states, last = _last_states(stack, one, levels, latent)
 
     @torch.inference_mode()
     def effect(points: Tensor) -> Tensor:

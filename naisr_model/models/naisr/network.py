@@ -11,23 +11,48 @@ The fields live at points of the *target* shape and point to the template.
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import dataclass, field
+from typing import ClassVar, final
+
 import torch
-from numpy.typing import ArrayLike
 from torch import Tensor, nn
 
-from naisr_model.config import NetworkConfig
+from naisr_model.config import NetworkConfig, SirenConfig
+from naisr_model.models.base import AdditiveModel, Capabilities, Linearised, PointFunction
+from naisr_model.models.naisr import calculus, inference
 from naisr_model.models.siren import SirenStack
 
 
-class Naisr(nn.Module):
-    """The networks T and f_1 ... f_N.
+@dataclass(frozen=True)
+class NaisrConfig(NetworkConfig):
+    """Sizes of the template network T and of the displacement networks f_i.
 
-    Shapes of all arguments: ``points [shapes, n, dim]`` in model units, ``covariates [shapes, N]``
-    centred (0 is the population centre), ``latents [shapes, L]`` (0 is the population average).
+    Attributes:
+        template: the network T.
+        displacement: every network f_i.
     """
 
-    def __init__(self, config: NetworkConfig, covariates: int) -> None:
+    template: SirenConfig = field(default_factory=SirenConfig)
+    displacement: SirenConfig = field(default_factory=SirenConfig)
+
+
+@final
+class Naisr(AdditiveModel):
+    """The networks T and f_1 ... f_N."""
+
+    title: ClassVar[str] = "NAISR"
+    capabilities: ClassVar[Capabilities] = Capabilities(
+        deformable=True,
+        disentangleable=True,
+        evolvable=True,
+        transferable=True,
+        has_template=True,
+        vanishes_at_centre=True,
+    )
+    settings: ClassVar[type[NetworkConfig]] = NaisrConfig
+    config: NaisrConfig
+
+    def __init__(self, config: NaisrConfig, covariates: int) -> None:
         super().__init__()
         self.config = config
         self.template_network = SirenStack(config.template, stack=1, dim=config.dim, outputs=1)
@@ -41,15 +66,6 @@ class Naisr(nn.Module):
             output_scale=0.01,  # the template is found undeformed before it is deformed
         )
 
-    @property
-    def device(self) -> torch.device:
-        """Where the weights are."""
-        return self.template_network.last_bias.device
-
-    def tensor(self, values: ArrayLike) -> Tensor:
-        """``values`` as the networks take them: in single precision, where the weights are."""
-        return torch.as_tensor(np.asarray(values, dtype=np.float32)).to(self.device)
-
     def template(self, points: Tensor) -> Tensor:
         """T, the template's signed distance, ``[shapes, n]``."""
         distance: Tensor = self.template_network(points)
@@ -57,27 +73,32 @@ class Naisr(nn.Module):
 
     def displacements(self, points: Tensor, covariates: Tensor, latents: Tensor) -> Tensor:
         """All g_i, ``[N, shapes, n, dim]``; 0 to rounding where c_i = 0."""
-        both = self.displacement_networks(points.repeat(2, 1, 1), self.conditions(covariates, latents))
+        both = self.displacement_networks(points.repeat(2, 1, 1), calculus.conditions(covariates, latents))
         value, zero = both.chunk(2, dim=1)
         return value - zero
 
-    @staticmethod
-    def conditions(covariates: Tensor, latents: Tensor) -> Tensor:
-        """What the f_i see beside the points: (c_i, z) of every shape, then (0, z).
+    def linearised(self, points: Tensor, covariates: Tensor, latents: Tensor) -> Linearised:
+        """Phi, grad Phi and grad T."""
+        conditions = calculus.conditions(covariates, latents)
+        return calculus.linearised(self.template_network, self.displacement_networks, points, conditions)
 
-        Returns:
-            ``[N, 2 * shapes, 1 + L]``.
-        """
-        codes = latents.expand(covariates.shape[1], *latents.shape)
-        at_value = torch.cat([covariates.T[..., None], codes], dim=-1)
-        at_zero = torch.cat([torch.zeros_like(covariates).T[..., None], codes], dim=-1)
-        return torch.cat([at_value, at_zero], dim=1)
+    def shape_function(self, covariates: Tensor, latent: Tensor) -> PointFunction:
+        """Phi of one shape, ``[n]``; networks of covariates at 0 are left out."""
+        displacement = inference.displacement_function(self.displacement_networks, covariates, latent)
 
-    def forward(self, points: Tensor, covariates: Tensor, latents: Tensor) -> tuple[Tensor, Tensor]:
-        """Phi and the whole displacement.
+        @torch.inference_mode()
+        def shape(points: Tensor) -> Tensor:
+            return self.template((points + displacement(points))[None])[0]
 
-        Returns:
-            The signed distance ``[shapes, n]`` and sum_i g_i ``[shapes, n, dim]``, both model units.
-        """
-        displacement = self.displacements(points, covariates, latents).sum(dim=0)
-        return self.template(points + displacement), displacement
+        return shape
+
+    def effect_function(self, index: int, values: Tensor, latent: Tensor) -> PointFunction:
+        """g_i at several values of c_i, ``[K, n, dim]``."""
+        return inference.effect_function(self.displacement_networks, index, values, latent)
+
+    def rated_parameters(self) -> dict[str, list[nn.Parameter]]:
+        """T and the f_i."""
+        return {
+            "template_rate": list(self.template_network.parameters()),
+            "displacement_rate": list(self.displacement_networks.parameters()),
+        }

@@ -1,4 +1,4 @@
-"""The networks against a plain, slow transcription of the paper's equations, in float64."""
+"""The networks of NAISR against a plain, slow transcription of the paper's equations, in float64."""
 
 import dataclasses
 
@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 import torch
 
-from naisr_model.config import PRESETS, NetworkConfig, SirenConfig
-from naisr_model.models.naisr.calculus import deformation_determinant, gradient, jacobian, linearised
-from naisr_model.models.naisr.inference import displacement_function, effect_function, shape_function
-from naisr_model.models.naisr.network import Naisr
+from naisr_model.config import SirenConfig
+from naisr_model.models.derivatives import deformation_determinant, gradient, jacobian
+from naisr_model.models.factory import build, preset
+from naisr_model.models.naisr.inference import displacement_function
+from naisr_model.models.naisr.network import Naisr, NaisrConfig
 from naisr_model.models.siren import sine
 
-SMALL = NetworkConfig(
+SMALL = NaisrConfig(
     latent=5, template=SirenConfig(16, 2, omega0=4.0), displacement=SirenConfig(12, 3, omega0=2.0)
 )
 
@@ -62,11 +63,12 @@ def plain_displacement(network, index, point, value, latent):
 @pytest.mark.parametrize("dim", [2, 3])
 def test_training_and_inference_follow_the_equations_of_the_paper(dim):
     network, (points, covariates, latents) = make(dim), arguments(dim)
-    values, displacement = network(points, covariates, latents)
+    values = network(points, covariates, latents)
+    displacement = network.displacement(points, covariates, latents)
     for s in range(3):
-        fused = displacement_function(network, covariates[s], latents[s])(points[s])
+        fused = displacement_function(network.displacement_networks, covariates[s], latents[s])(points[s])
         full, *effects = (
-            shape_function(network, kept, latents[s])(points[s])
+            network.shape_function(kept, latents[s])(points[s])
             for kept in (covariates[s], *torch.diag(covariates[s]))
         )
         for n in range(7):
@@ -90,10 +92,11 @@ def test_at_inference_a_covariate_at_its_centre_is_left_out(monkeypatch):
         return product(bias, state, weight)
 
     monkeypatch.setattr(torch, "baddbmm", counted)
-    displaced = displacement_function(network, torch.tensor([0.0, 0.7, 0.0]), latents[0])(points[0])
+    stack = network.displacement_networks
+    displaced = displacement_function(stack, torch.tensor([0.0, 0.7, 0.0]), latents[0])(points[0])
     assert evaluated == {1}
     assert displaced.abs().max() > 1e-3
-    assert (displacement_function(network, torch.zeros(3), latents[0])(points[0]) == 0).all()
+    assert (displacement_function(stack, torch.zeros(3), latents[0])(points[0]) == 0).all()
 
 
 def test_a_covariate_at_its_centre_displaces_nothing_whatever_the_code():
@@ -105,11 +108,11 @@ def test_a_covariate_at_its_centre_displaces_nothing_whatever_the_code():
 
 
 @pytest.mark.parametrize(
-    ("preset", "covariates", "published"),
+    ("name", "covariates", "published"),
     [("paper-airway", 3, 1.26e6), ("paper-hippocampus", 4, 2.26e6), ("paper-starman", 2, 1.33e6)],
 )
-def test_presets_have_the_published_number_of_parameters(preset, covariates, published):
-    network = Naisr(PRESETS[preset].network, covariates)
+def test_presets_have_the_published_number_of_parameters(name, covariates, published):
+    network = build(preset(name), covariates)
     assert sum(p.numel() for p in network.parameters()) == pytest.approx(published, rel=0.01)
 
 
@@ -130,13 +133,15 @@ def test_a_third_derivative_is_right_too():
 def test_gradients_agree_with_finite_differences():
     network, (points, covariates, latents) = make(), arguments()
     points.requires_grad_()
-    values, displacement = network(points, covariates, latents)
+    values = network(points, covariates, latents)
+    displacement = network.displacement(points, covariates, latents)
     slope, bend = gradient(values, points), jacobian(displacement, points)
     step = 1e-6
     for axis in range(3):
         shift = torch.zeros(3, dtype=torch.float64)
         shift[axis] = step
-        (up, up_d), (down, down_d) = (network(points + s, covariates, latents) for s in (shift, -shift))
+        up, down = (network(points + s, covariates, latents) for s in (shift, -shift))
+        up_d, down_d = (network.displacement(points + s, covariates, latents) for s in (shift, -shift))
         torch.testing.assert_close(slope[..., axis], (up - down) / (2 * step), atol=1e-6, rtol=1e-6)
         torch.testing.assert_close(bend[..., axis], (up_d - down_d) / (2 * step), atol=1e-6, rtol=1e-6)
 
@@ -144,10 +149,10 @@ def test_gradients_agree_with_finite_differences():
 def test_the_chain_rule_gives_the_same_gradient():
     network, (points, covariates, latents) = make(), arguments()
     points.requires_grad_()
-    values, displacement = network(points, covariates, latents)
-    local = linearised(network, points.detach(), covariates, latents)
+    values = network(points, covariates, latents)
+    displacement = network.displacement(points, covariates, latents)
+    local = network.linearised(points.detach(), covariates, latents)
     torch.testing.assert_close(local.values, values)
-    torch.testing.assert_close(local.displacement, displacement)
     torch.testing.assert_close(local.slope, gradient(values, points))
     deformed = (points + displacement).detach().requires_grad_()
     torch.testing.assert_close(local.template_slope, gradient(network.template(deformed), deformed))
@@ -164,7 +169,7 @@ def test_determinant_of_a_known_map():
 def test_one_effect_at_several_values_is_that_effect_at_each():
     network, (points, covariates, latents) = make(), arguments()
     values = torch.tensor([-1.5, 0.0, 0.4, 2.0], dtype=torch.float64)
-    found = effect_function(network, 1, values, latents[0])(points[0])
+    found = network.effect_function(1, values, latents[0])(points[0])
     for value, displacement in zip(values, found, strict=True):
         alone = torch.zeros_like(covariates[:1])
         alone[0, 1] = value

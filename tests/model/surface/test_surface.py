@@ -184,13 +184,13 @@ def test_nothing_is_missed_at_the_corners_of_a_shipped_atlas(atlas, corner):
     checkpoint = load(Path(__file__).parents[3] / "resources" / f"{atlas}.safetensors")
     extremes = [(c.range[corner] - c.centre) / c.scale for c in checkpoint.population.covariates]
     latent = torch.as_tensor(checkpoint.latents[3])
-    assert_same_mesh(shape_field(checkpoint.network(), torch.tensor(extremes), latent), Lattice(48))
+    assert_same_mesh(shape_field(checkpoint.model(), torch.tensor(extremes), latent), Lattice(48))
 
 
 @pytest.mark.parametrize("name", ["airway", "bodies"])
 def test_a_tracker_misses_nothing_of_a_shipped_atlas(name):
     atlas = Atlas.load(Path(__file__).parents[3] / "resources" / f"{name}.safetensors")
-    template, network = atlas.template(128), atlas.checkpoint.network()
+    template, network = atlas.template(128), atlas.checkpoint.model()
     tracker = atlas.tracker(template, atlas.tabulate(template))
     latent = torch.zeros(atlas.checkpoint.preset.network.latent)
     low, high = np.array([c.range for c in atlas.covariates]).T

@@ -13,7 +13,7 @@ import trimesh
 from naisr_model.atlas import Atlas
 from naisr_model.errors import Cancelled, InputError
 from naisr_model.learning.fitting import prior
-from naisr_model.models.naisr.inference import displacement_function
+from naisr_model.models.base import deformable
 from naisr_model.progress import Progress
 from naisr_model.surface.displacements import SPACINGS, TOLERANCE, Displacements, DisplacementTables, sample
 from naisr_model.surface.fields import shape_field
@@ -49,8 +49,10 @@ def tracker(atlas: Atlas, template: trimesh.Trimesh, tables: DisplacementTables)
 
 def exact_displacement(atlas: Atlas, vector: list[float], points: np.ndarray) -> np.ndarray:
     latent = torch.zeros(atlas.checkpoint.preset.network.latent)
-    field = displacement_function(atlas.checkpoint.network(), torch.tensor(vector), latent)
-    return field(torch.as_tensor(points, dtype=torch.float32)).numpy()
+    model = deformable(atlas.checkpoint.model())
+    located = torch.as_tensor(points, dtype=torch.float32)[None]
+    with torch.inference_mode():
+        return model.displacement(located, torch.tensor([vector]), latent[None])[0].numpy()
 
 
 def test_tables_agree_with_the_networks_between_nodes_and_knots(atlas, tables):
@@ -118,9 +120,7 @@ def test_the_guess_is_the_field_near_the_surface(atlas, tracker, values):
 def test_a_tracker_saves_evaluations_and_changes_nothing(atlas, tracker):
     values, lattice = {"age": 8.0, "sex": 0.5}, Lattice(128)
     vector = torch.tensor([float(c.normalise(values[c.name])) for c in atlas.covariates])
-    field = shape_field(
-        atlas.checkpoint.network(), vector, torch.zeros(atlas.checkpoint.preset.network.latent)
-    )
+    field = shape_field(atlas.checkpoint.model(), vector, torch.zeros(atlas.checkpoint.preset.network.latent))
     counts = []
 
     def counting(points):

@@ -13,7 +13,7 @@ from eggs import egg
 
 from naisr_model import cli
 from naisr_model.atlas import Atlas
-from naisr_model.config import FitConfig, NetworkConfig, SirenConfig
+from naisr_model.config import FitConfig, SirenConfig
 from naisr_model.covariates import growth_path
 from naisr_model.errors import Cancelled, InputError
 from naisr_model.evaluation.studies.fit_speed import compare_fits, comparison_markdown
@@ -24,7 +24,7 @@ from naisr_model.learning.fitting.prior import Prior, Told, believed, conditiona
 from naisr_model.learning.fitting.search import STAGES, draw_sample, fit_shape
 from naisr_model.learning.fitting.sensitivity import sensitivity
 from naisr_model.learning.fitting.target import target_of
-from naisr_model.models.naisr.network import Naisr
+from naisr_model.models.naisr.network import Naisr, NaisrConfig
 from naisr_model.patients.evolution import along_only, evolution, write_series
 from naisr_model.progress import SILENT, Progress
 
@@ -49,14 +49,14 @@ def prior(atlas) -> Prior:
 @pytest.fixture(scope="module")
 def lost(atlas, made, prior):
     """A problem with the age to be found, far from its solution: problem, sample and parameters."""
-    problem = Problem(atlas.checkpoint.network(), prior, np.array([np.nan, 1.0]), 6.0)
+    problem = Problem(atlas.checkpoint.model(), prior, np.array([np.nan, 1.0]), 6.0)
     sample = draw_sample(target_of(made[2], atlas.frame), 200, 0)
     return problem, sample, problem.pack(prior.lowest, np.zeros(4))
 
 
 def test_derivatives_are_those_of_finite_differences():
     torch.manual_seed(0)
-    config = NetworkConfig(latent=3, template=SirenConfig(16, 1, 3.0), displacement=SirenConfig(8, 1, 2.0))
+    config = NaisrConfig(latent=3, template=SirenConfig(16, 1, 3.0), displacement=SirenConfig(8, 1, 2.0))
     network = Naisr(config, 2).double()
     for parameter in network.displacement_networks.parameters():
         torch.nn.init.normal_(parameter, std=0.1)
@@ -66,7 +66,7 @@ def test_derivatives_are_those_of_finite_differences():
     local = sensitivity(network, points, theta[:2], theta[2:])
 
     def values(parameters):
-        return network(points[None], parameters[None, :2], parameters[None, 2:])[0][0].detach()
+        return network(points[None], parameters[None, :2], parameters[None, 2:])[0].detach()
 
     slope = values(theta) / local.distances
     for column in range(5):
@@ -143,7 +143,7 @@ def test_adam_helps_where_least_squares_stall(lost):
 
 def test_a_fit_costs_few_evaluations(atlas, made, prior):
     target = target_of(made[2], atlas.frame)
-    result = fit_shape(atlas.checkpoint.network(), target, prior, np.array([0.5, 1.0]))[0]
+    result = fit_shape(atlas.checkpoint.model(), target, prior, np.array([0.5, 1.0]))[0]
     # Levenberg-Marquardt takes some steps where the paper's procedure takes 800 of 750 points.
     assert result.evaluations <= 1.25 * 5 * sum(STAGES) < 0.05 * 800 * 750
 

@@ -5,12 +5,12 @@ import pytest
 import torch
 
 from naisr_model.benchmark.plain import PlainNaisr, plain_loss
-from naisr_model.config import LossWeights, NetworkConfig, SirenConfig
+from naisr_model.config import LossWeights, SirenConfig
 from naisr_model.learning.training import losses
 from naisr_model.learning.training.loop import residual_latents
 from naisr_model.learning.training.objective import Batch, latent_term, population_terms, reconstruction_terms
 from naisr_model.learning.training.residual import covariate_basis
-from naisr_model.models.naisr.network import Naisr
+from naisr_model.models.naisr.network import Naisr, NaisrConfig
 
 
 def test_a_sphere_s_distance_has_no_loss():
@@ -56,7 +56,7 @@ def test_folding_counts_only_negative_determinants():
 
 
 def test_population_terms_push_the_template_to_the_middle_of_the_levels():
-    config = NetworkConfig(latent=2, template=SirenConfig(8, 1, 5.0), displacement=SirenConfig(8, 1, 3.0))
+    config = NaisrConfig(latent=2, template=SirenConfig(8, 1, 5.0), displacement=SirenConfig(8, 1, 3.0))
     torch.manual_seed(0)
     network = Naisr(config, covariates=2)
     points, covariates = torch.rand(2, 30, 3), torch.tensor([[0.5, 1.0], [-0.2, -1.0]])
@@ -95,7 +95,7 @@ def test_a_small_population_keeps_codes_to_spare():
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_the_loss_and_its_gradients_are_those_of_the_plain_equations(dim):
-    config = NetworkConfig(
+    config = NaisrConfig(
         dim, latent=5, template=SirenConfig(16, 2, omega0=4.0), displacement=SirenConfig(12, 3, omega0=2.0)
     )
     torch.manual_seed(0)
@@ -133,7 +133,7 @@ def test_the_loss_and_its_gradients_are_those_of_the_plain_equations(dim):
 
 def test_single_precision_agrees_with_double():
     torch.manual_seed(0)
-    network = Naisr(NetworkConfig(latent=4), covariates=2)
+    network = Naisr(NaisrConfig(latent=4), covariates=2)
     normals = torch.nn.functional.normalize(torch.randn(2, 20, 3), dim=-1)
     batch = Batch(torch.rand(2, 20, 3), normals, torch.rand(2, 10, 3), torch.rand(2, 10))
     covariates, latents, weights = torch.randn(2, 2), torch.zeros(2, 4), LossWeights()

@@ -15,12 +15,13 @@ from eggs import egg, egg_preset
 
 from naisr_model.atlas import Atlas
 from naisr_model.checkpoint import load
-from naisr_model.config import PRESETS, FitConfig, LossWeights
+from naisr_model.config import FitConfig, LossWeights
 from naisr_model.errors import Cancelled, InputError
 from naisr_model.learning.fitting.search import fit_latents
 from naisr_model.learning.training import loop as training
 from naisr_model.learning.training.loop import train
 from naisr_model.learning.training.objective import Batch
+from naisr_model.models.factory import preset as named
 from naisr_model.progress import Progress
 
 
@@ -109,7 +110,7 @@ def test_other_data_do_not_continue_a_training(egg_store, tmp_path):
 
 
 def test_settings_that_do_not_fit_are_refused(egg_store, tmp_path):
-    flat = dataclasses.replace(egg_preset(1), network=PRESETS["paper-starman"].network)
+    flat = dataclasses.replace(egg_preset(1), network=named("paper-starman").network)
     with pytest.raises(InputError, match="2D shapes and the store holds 3D"):
         train(egg_store, flat, tmp_path / "a.safetensors")
     with pytest.raises(InputError, match="cannot compute on 'abacus'"):
@@ -165,13 +166,13 @@ def test_a_time_budget_bounds_the_training_over_all_its_runs(egg_store, tmp_path
 
 def test_fitting_recovers_the_code_of_a_shape_the_atlas_can_make(egg_atlas):
     checkpoint = load(egg_atlas)
-    network = checkpoint.network()
+    network = checkpoint.model()
     latent = torch.as_tensor(checkpoint.latents[:1])
     covariates = torch.tensor([[1.0, 1.0]])
     generator = np.random.default_rng(0)
     points = torch.as_tensor(generator.uniform(-1, 1, (1, 400, 3)), dtype=torch.float32)
     with torch.inference_mode():
-        target = network(points, covariates, latent)[0]
+        target = network(points, covariates, latent)
     batch = Batch(points[:, :1], torch.ones(1, 1, 3), points.clone(), target.clone())
     only_distances = LossWeights(
         surface_eikonal=0.0, surface_distance=0.0, surface_normal=0.0, space_eikonal=0.0, latent=1e-4
@@ -179,8 +180,8 @@ def test_fitting_recovers_the_code_of_a_shape_the_atlas_can_make(egg_atlas):
     config = FitConfig(steps=300, rate=2e-2)
     found = fit_latents(network, lambda rng: batch, covariates, config, only_distances)
     with torch.inference_mode():
-        missed = (network(points, covariates, found)[0] - target).abs().mean()
-        without = (network(points, covariates, torch.zeros_like(found))[0] - target).abs().mean()
+        missed = (network(points, covariates, found) - target).abs().mean()
+        without = (network(points, covariates, torch.zeros_like(found)) - target).abs().mean()
     assert missed < 0.2 * without + 1e-5
     given_up = Progress(is_unwanted=lambda: True)
     with pytest.raises(Cancelled):

@@ -1,0 +1,196 @@
+"""What every shape model answers, and what only some can.
+
+Classes here are abstract, those of the models final: a method is either left open here or settled here,
+never both. A new model is one file beside this one and one line in :mod:`naisr_model.models.factory`.
+
+Everywhere, ``points [shapes, n, dim]`` are in model units, ``covariates [shapes, N]`` centred (0 is the
+population centre), ``latents [shapes, L]`` codes, of which 0 is the average; N is 0 for a model that
+depends on no covariates.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple, final
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike
+from torch import Tensor, nn
+
+from naisr_model.config import NetworkConfig
+from naisr_model.covariates import Population
+from naisr_model.errors import InputError
+
+PointFunction = Callable[[Tensor], Tensor]
+"""Of points ``[n, dim]`` in model units, on the device and in the precision of the model."""
+
+
+@dataclass(frozen=True)
+class Capabilities:
+    """What a model can do, in the terms of Table 1 of Jiao et al. (ICLR 2024), and two facts about it.
+
+    Attributes:
+        implicit: a shape is the zero level set of a field that is defined everywhere.
+        deformable: that field is a template's at points that were moved, so that shapes correspond.
+        disentangleable: the shape of one covariate alone can be shown.
+        evolvable: shapes depend on covariates and can be followed along them.
+        transferable: a person's shape is known at other covariates than those at which it was seen.
+        invertible: p -> p + d(p) cannot fold.
+        has_template: there is a shape T that all others are deformed from.
+        vanishes_at_centre: nothing is displaced where all covariates are at their centre, whatever the
+            code is: g_i(p, 0, z) = 0, and the shape there is the template.
+    """
+
+    implicit: bool = True
+    deformable: bool = False
+    disentangleable: bool = False
+    evolvable: bool = False
+    transferable: bool = False
+    invertible: bool = False
+    has_template: bool = False
+    vanishes_at_centre: bool = False
+
+    @property
+    def trackable(self) -> bool:
+        """Whether the template's surface can be carried to a shape from tables of displacements."""
+        return self.deformable and self.disentangleable and self.vanishes_at_centre
+
+
+class Linearised(NamedTuple):
+    """A field and its derivatives, model units.
+
+    Attributes:
+        values: Phi, ``[shapes, n]``.
+        slope: grad Phi with respect to the points, ``[shapes, n, dim]``.
+        template_slope: grad T at the deformed points, ``[shapes, n, dim]``; None without a template.
+    """
+
+    values: Tensor
+    slope: Tensor
+    template_slope: Tensor | None
+
+
+class ShapeModel(nn.Module, ABC):
+    """A family of shapes, one for each code and covariates.
+
+    A model is made of its settings and of the number of covariates that were measured.
+
+    Attributes:
+        title: as people call the model.
+        capabilities: what it can do.
+        settings: the kind of its ``config``.
+        config: sizes of its networks.
+    """
+
+    title: ClassVar[str]
+    capabilities: ClassVar[Capabilities]
+    settings: ClassVar[type[NetworkConfig]]
+    config: NetworkConfig
+
+    @final
+    @property
+    def device(self) -> torch.device:
+        """Where the weights are."""
+        return next(self.parameters()).device
+
+    @final
+    def tensor(self, values: ArrayLike) -> Tensor:
+        """``values`` as the networks take them: in single precision, where the weights are."""
+        return torch.as_tensor(np.asarray(values, dtype=np.float32)).to(self.device)
+
+    @final
+    @classmethod
+    def relevant(cls, population: Population) -> Population:
+        """A population with only those of its covariates that the model depends on: all or none."""
+        return population if cls.capabilities.evolvable else population.keeping(())
+
+    @abstractmethod
+    def forward(self, points: Tensor, covariates: Tensor, latents: Tensor) -> Tensor:
+        """Phi, the signed distance, ``[shapes, n]`` model units, negative inside."""
+
+    @abstractmethod
+    def linearised(self, points: Tensor, covariates: Tensor, latents: Tensor) -> Linearised:
+        """Phi and its slope as a loss needs them: one backward pass through them, not one through another."""
+
+    @abstractmethod
+    def shape_function(self, covariates: Tensor, latent: Tensor) -> PointFunction:
+        """Phi of one shape, ``[n]``, without gradients and as fast as it can be had.
+
+        Args:
+            covariates: ``[N]``.
+            latent: ``[L]``.
+        """
+
+    @abstractmethod
+    def rated_parameters(self) -> dict[str, list[nn.Parameter]]:
+        """All parameters, by the setting of ``TrainingConfig`` that is their learning rate."""
+
+
+class DeformableModel(ShapeModel, ABC):
+    """Phi(p, c, z) = T(p + d(p, c, z)): a template met at points that were moved.
+
+    The displacements live at points of the shape and lead to the template.
+    """
+
+    @abstractmethod
+    def template(self, points: Tensor) -> Tensor:
+        """T, the template's signed distance, ``[shapes, n]``."""
+
+    @abstractmethod
+    def displacement(self, points: Tensor, covariates: Tensor, latents: Tensor) -> Tensor:
+        """The whole displacement d, ``[shapes, n, dim]``."""
+
+    def forward(self, points: Tensor, covariates: Tensor, latents: Tensor) -> Tensor:
+        """As :meth:`ShapeModel.forward`."""
+        return self.template(points + self.displacement(points, covariates, latents))
+
+
+class AdditiveModel(DeformableModel, ABC):
+    """d = sum_i g_i(p, c_i, z), and every g_i vanishes at c_i = 0."""
+
+    @abstractmethod
+    def displacements(self, points: Tensor, covariates: Tensor, latents: Tensor) -> Tensor:
+        """All g_i, ``[N, shapes, n, dim]``; 0 to rounding where c_i = 0."""
+
+    @abstractmethod
+    def effect_function(self, index: int, values: Tensor, latent: Tensor) -> PointFunction:
+        """g_i of one covariate at several of its values, ``[K, n, dim]``, without gradients.
+
+        Args:
+            index: i.
+            values: of c_i, centred, ``[K]``.
+            latent: z, ``[L]``.
+        """
+
+    @final
+    def displacement(self, points: Tensor, covariates: Tensor, latents: Tensor) -> Tensor:
+        """As :meth:`DeformableModel.displacement`."""
+        return self.displacements(points, covariates, latents).sum(dim=0)
+
+
+def deformable(model: ShapeModel) -> DeformableModel:
+    """``model``, known to deform a template.
+
+    Raises:
+        InputError: when it does not.
+    """
+    if isinstance(model, DeformableModel):
+        return model
+    raise InputError(f"{model.title} deforms no template, which this needs; ask for the shape itself")
+
+
+def additive(model: ShapeModel) -> AdditiveModel:
+    """``model``, known to give each covariate a displacement of its own.
+
+    Raises:
+        InputError: when it does not.
+    """
+    if isinstance(model, AdditiveModel):
+        return model
+    raise InputError(
+        f"{model.title} gives the covariates no displacements of their own, which this needs; "
+        "ask for the shape itself"
+    )
