@@ -7,6 +7,7 @@ import dataclasses
 import trimesh
 
 from naisr_model.config import Preset, SirenConfig
+from naisr_model.models.deepsdf import DeepSdfConfig
 from naisr_model.models.factory import preset
 from naisr_model.models.naisr.network import NaisrConfig
 
@@ -34,3 +35,16 @@ def egg_preset(epochs: int) -> Preset:
         displacement_rate=2e-3,
     )
     return Preset("naisr", network, training)
+
+
+def egg_deepsdf_preset(epochs: int) -> Preset:
+    """The same for DeepSDF, whose codes have age and sex to tell."""
+    network = DeepSdfConfig(latent=4, shape=SirenConfig(32, 1, omega0=5.0))
+    training = dataclasses.replace(
+        preset("deepsdf-demo").training,
+        epochs=epochs,
+        batch_shapes=10,
+        template_rate=2e-3,
+        latent_rate=1e-2,
+    )
+    return Preset("deepsdf", network, training)

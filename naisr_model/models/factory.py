@@ -17,6 +17,7 @@ from naisr_model.models.base import ShapeModel
 MODELS = MappingProxyType(
     {
         "naisr": "naisr_model.models.naisr",
+        "deepsdf": "naisr_model.models.deepsdf",
     }
 )
 """Module of each model; importing this one imports none of them."""

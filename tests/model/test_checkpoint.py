@@ -54,6 +54,8 @@ def test_a_file_from_before_there_were_other_models_is_naisr_s(egg_atlas, tmp_pa
 def test_an_unknown_model_is_named(egg_atlas, tmp_path):
     with pytest.raises(InputError, match=r"model 'cubes', which this program does not know; update"):
         load(with_preset(egg_atlas, tmp_path / "new.safetensors", model="cubes"))
+    with pytest.raises(InputError, match="contradicts itself"):
+        load(with_preset(egg_atlas, tmp_path / "wrong.safetensors", model="deepsdf"))
 
 
 def test_a_missing_file_is_named(tmp_path):

@@ -119,6 +119,7 @@ def test_settings_from_a_file_change_only_what_they_name(tmp_path):
         ("[training]\nepochs = 'many'\n", "'training.epochs' is 'many'; expected int"),
         ("training = 3\n", "'training' is 3; expected a table"),
         ("[training\n", "cannot read"),
+        ('model = "deepsdf"', "'deepsdf' and the preset is for 'naisr'"),
     ],
 )
 def test_wrong_settings_are_named(tmp_path, text, message):
