@@ -24,6 +24,8 @@ from naisr_model.checkpoint import Checkpoint, load
 from naisr_model.covariates import Covariate, Population, Values, complete, normalised_vector
 from naisr_model.errors import InputError
 from naisr_model.frames import Frame
+from naisr_model.learning.fitting.belief import places_of
+from naisr_model.learning.fitting.evidence import ShapeFit
 from naisr_model.learning.fitting.posterior import (
     POINTS,
     TWO_SIDED_95,
@@ -35,9 +37,9 @@ from naisr_model.learning.fitting.posterior import (
     surface_deviations,
     volume_deviation,
 )
-from naisr_model.learning.fitting.prior import Prior, places_of, prior_of
-from naisr_model.learning.fitting.search import ShapeFit, draw_sample, fit_shape
-from naisr_model.learning.fitting.target import target_of
+from naisr_model.learning.fitting.prior import Prior, prior_of
+from naisr_model.learning.fitting.search import fit_shape
+from naisr_model.learning.fitting.target import draw_sample, target_of
 from naisr_model.models.base import Capabilities, ShapeModel, additive, deformable
 from naisr_model.models.devices import usable_device
 from naisr_model.progress import SILENT, Progress
@@ -623,7 +625,7 @@ class Fit:
             return float(min(possible)), float(max(possible))
         number = int(np.flatnonzero(self.results[0].free == column)[0])
         densities = np.array([result.densities[number] for result in self.results])
-        places = places_of(self.individual.atlas._prior, column)
+        places = places_of(self.individual.posterior.problem.prior, column)
         ends = np.interp([TAIL, 1 - TAIL], np.cumsum(self._shares @ densities), places)
         low, high = covariate.restore(ends).tolist()
         return low, high

@@ -59,6 +59,10 @@ def test_questions_it_cannot_answer_get_a_sentence(atlas, call, message):
 def test_extrapolation_is_there_for_those_who_ask(atlas):
     grown = atlas.shape({"age": 10}, resolution=32, extrapolate=True)
     assert isinstance(grown, trimesh.Trimesh) and len(grown.faces)
+    fit = atlas.fit(grown, {"age": 10, "sex": 0}, extrapolate=True)
+    assert fit.covariates["age"] == pytest.approx(10) and fit.residual_mm < 1
+    with pytest.raises(InputError, match="10 years"):
+        atlas.fit(grown, {"age": 10})
 
 
 def test_cancelling(atlas):

@@ -18,10 +18,16 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from naisr_model.learning.fitting.least_squares import Problem, Sample, evaluate, linearise
+from naisr_model.learning.fitting.evidence import ShapeFit
+from naisr_model.learning.fitting.least_squares import (
+    FOLLOWED_POINTS,
+    INDEPENDENT_POINTS,
+    Problem,
+    evaluate,
+    linearise,
+)
 from naisr_model.learning.fitting.prior import Prior
-from naisr_model.learning.fitting.search import FOLLOWED_POINTS, INDEPENDENT_POINTS, ShapeFit, draw_sample
-from naisr_model.learning.fitting.target import Target
+from naisr_model.learning.fitting.target import Sample, Target, draw_sample
 from naisr_model.models.base import ShapeModel
 
 Vector = NDArray[np.float64]

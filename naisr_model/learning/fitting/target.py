@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+import torch
 import trimesh
 from numpy.typing import ArrayLike, NDArray
+from torch import Tensor
 
 from naisr_model.data.samples import sample_shape
 from naisr_model.errors import InputError
@@ -14,6 +17,10 @@ from naisr_model.frames import Frame
 
 SURFACE_SAMPLES, NEAR_SAMPLES = 12_000, 6_000
 FEWEST_POINTS = 30
+
+SPACE_SHARE = 0.25
+"""Points off the surface for each one on it, where the target says what is inside: they keep the shape from
+turning inside out and surfaces away that the patient does not have."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,3 +58,21 @@ def target_of(shape: trimesh.Trimesh | ArrayLike, frame: Frame, seed: int = 0) -
     near = NEAR_SAMPLES if mesh.is_watertight else 0
     samples = sample_shape(mesh, frame, SURFACE_SAMPLES, near, 0, seed)
     return Target(samples.surface[:, : frame.dim], samples.near)
+
+
+class Sample(NamedTuple):
+    """Points ``[n, dim]`` and their true distances to the surface ``[n]``, model units."""
+
+    points: Tensor
+    distances: Tensor
+
+
+def draw_sample(target: Target, points: int, seed: int) -> Sample:
+    """``points`` surface points, or all there are, and their share of points off the surface."""
+    rng, dim = np.random.default_rng(seed), target.surface.shape[1]
+    surface = target.surface[rng.permutation(len(target.surface))[:points]]
+    space = target.space[rng.permutation(len(target.space))[: int(SPACE_SHARE * len(surface))]]
+    return Sample(
+        torch.as_tensor(np.concatenate([surface, space[:, :dim]])),
+        torch.as_tensor(np.concatenate([np.zeros(len(surface), np.float32), space[:, dim]])),
+    )

@@ -12,6 +12,7 @@ import itertools
 
 import numpy as np
 from numpy.typing import NDArray
+from torch import Tensor
 
 SHAPES_A_FUNCTION = 5
 """A function is added to the basis only while there are this many shapes for each."""
@@ -46,3 +47,8 @@ def _tents(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Piecewise linear functions that are 1 at one of :data:`KNOTS` quantiles and 0 at the others."""
     knots = np.unique(np.quantile(values, np.linspace(0, 1, KNOTS)))
     return np.array([np.interp(values, knots, unit) for unit in np.eye(len(knots))])
+
+
+def residual_latents(codes: Tensor, basis: Tensor) -> Tensor:
+    """The codes ``[n, L]`` less their projection on orthonormal columns ``basis [n, K]``."""
+    return codes - basis @ (basis.T @ codes)

@@ -14,8 +14,7 @@ from naisr_model.checkpoint import load
 from naisr_model.covariates import normalised_vector
 from naisr_model.errors import Cancelled
 from naisr_model.frames import Frame
-from naisr_model.progress import SILENT, Progress
-from naisr_model.surface import sparse
+from naisr_model.progress import Progress
 from naisr_model.surface.fields import shape_field
 from naisr_model.surface.isosurface import isosurface
 from naisr_model.surface.lattice import Lattice
@@ -299,16 +298,22 @@ def test_between_evaluated_nodes_a_field_is_continued():
 
 
 def test_the_surface_is_followed_out_of_what_was_evaluated():
-    lattice = Lattice(32)
-    band = sparse._Band(sphere, lattice, sparse._Meter(SILENT))
-    seed = np.array([[25, 16, 16]])  # (0.6, 0, 0) is on the sphere
-    band.open(seed, 1)
-    sparse._follow(band, seed)
-    everywhere = evaluate_everywhere(sphere, lattice)
-    for axis in range(3):
-        crossed = np.argwhere(np.diff(everywhere < 0, axis=axis))
-        for ends in (crossed, crossed + np.eye(3, dtype=int)[axis]):
-            assert np.isfinite(band.values[tuple(ends.T)]).all()
+    """Threads through a ball run into blocks that were left out, whose own bounds nothing has broken."""
+    rng = np.random.default_rng(175)
+    places, widths, depths = (
+        rng.uniform(-0.6, 0.6, (6, 3)),
+        rng.uniform(0.02, 0.12, 6),
+        rng.uniform(-0.3, 0.3, 6),
+    )
+
+    def threaded(points):
+        values = np.linalg.norm(points, axis=1) - 0.5
+        for place, width, depth in zip(places, widths, depths, strict=True):
+            across = np.hypot(*(points - place)[:, :2].T)
+            values = values + depth * np.exp(-((across / width) ** 2))
+        return values.astype(np.float32)
+
+    assert_same_mesh(threaded, Lattice(64))
 
 
 def test_no_surface_is_an_empty_mesh():

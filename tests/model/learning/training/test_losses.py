@@ -7,9 +7,8 @@ import torch
 from naisr_model.benchmark.plain import PlainNaisr, plain_loss
 from naisr_model.config import LossWeights, SirenConfig
 from naisr_model.learning.training import losses
-from naisr_model.learning.training.loop import residual_latents
 from naisr_model.learning.training.objective import Batch, latent_term, population_terms, reconstruction_terms
-from naisr_model.learning.training.residual import covariate_basis
+from naisr_model.learning.training.residual import covariate_basis, residual_latents
 from naisr_model.models.naisr.network import Naisr, NaisrConfig
 
 

@@ -17,8 +17,9 @@ from naisr_model.atlas import Atlas
 from naisr_model.checkpoint import load
 from naisr_model.config import FitConfig, LossWeights
 from naisr_model.errors import Cancelled, InputError
-from naisr_model.learning.fitting.search import fit_latents
+from naisr_model.learning.fitting.paper import fit_latents
 from naisr_model.learning.training import loop as training
+from naisr_model.learning.training import step
 from naisr_model.learning.training.loop import train
 from naisr_model.learning.training.objective import Batch
 from naisr_model.models.factory import preset as named
@@ -61,6 +62,7 @@ from pathlib import Path
 from eggs import egg_preset
 from naisr_model.data.store import SampleStore
 from naisr_model.learning.training import loop as training
+from naisr_model.learning.training import step
 
 torch.set_num_threads(1)
 training.SAVE_SECONDS = 0.0
@@ -139,7 +141,7 @@ def test_divergence_stops_with_advice_and_keeps_the_last_good_state(egg_store, t
 
 def test_nan_stops_a_training_at_once(egg_store, tmp_path, monkeypatch):
     nothing = lambda *_, **__: {"broken": torch.tensor(float("nan"), requires_grad=True)}  # noqa: E731
-    monkeypatch.setattr(training, "latent_term", nothing)
+    monkeypatch.setattr(step, "latent_term", nothing)
     with pytest.raises(InputError, match=r"iteration 0 \(loss nan\); no good state"):
         train(egg_store, egg_preset(epochs=1), tmp_path / "nan.safetensors")
 

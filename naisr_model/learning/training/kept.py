@@ -1,0 +1,98 @@
+"""What a training keeps on the disk: the atlas, the state to go on from, and the template now and then."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+import numpy as np
+import torch
+
+from naisr_model import checkpoint as checkpoints
+from naisr_model.checkpoint import Checkpoint
+from naisr_model.errors import InputError
+from naisr_model.files import replacing
+from naisr_model.learning.training.residual import residual_latents
+from naisr_model.learning.training.task import State, Task
+from naisr_model.models.base import DeformableModel, deformable
+from naisr_model.surface.fields import template_field
+from naisr_model.surface.folding import folded_shares
+from naisr_model.surface.isosurface import isosurface
+from naisr_model.surface.lattice import Lattice
+from naisr_model.surface.sparse import evaluate_band
+
+FOLDING_SHAPES = 20
+"""Training shapes whose surfaces are looked at for folds."""
+
+
+def save(state: State, task: Task, figures: Mapping[str, float] = MappingProxyType({})) -> Checkpoint:
+    """Write the atlas, and the state to go on from; ``figures`` stand in the atlas beside the iterations."""
+    store = task.store
+    checkpoint = Checkpoint(
+        name=store.name,
+        preset=task.preset,
+        weights={name: tensor.clone() for name, tensor in state.model.state_dict().items()},
+        latents=residual_latents(state.codes.detach(), task.basis).numpy(force=True),
+        population=store.population,
+        frame=store.frame,
+        alignment=store.alignment,
+        source=store.source,
+        training={"iterations": state.iteration, "seconds": round(state.seconds, 1), **figures},
+    )
+    checkpoints.save(task.out, checkpoint)
+    with replacing(task.folder / "state.pt") as temporary:
+        torch.save(state.to_dict() | {"fingerprint": task.fingerprint}, temporary)
+    return checkpoint
+
+
+def resume(state: State, task: Task) -> None:
+    """Go on from the state in the training's folder, if there is one.
+
+    Raises:
+        InputError: for a state that cannot be read, or is of other settings or data.
+    """
+    path = task.folder / "state.pt"
+    for left_over in task.folder.glob(".state.*.pt"):  # of a program that was killed while it saved
+        left_over.unlink()
+    if not path.exists():
+        return
+    try:
+        record = torch.load(path, weights_only=True, map_location=task.covariates.device)
+        same = record["fingerprint"] == task.fingerprint
+        if same:
+            state.load(record)
+    except Exception as error:
+        raise InputError(f"{path} cannot be read ({error}); delete its folder to start again") from error
+    if not same:
+        raise InputError(
+            f"{task.folder} holds a training with other settings or data; delete it to start again, "
+            f"or give another --out"
+        )
+
+
+def keep_template(state: State, task: Task) -> None:
+    """Write the template as a mesh when one of the chosen epochs has just ended."""
+    epoch, rest = divmod(state.iteration, task.epoch_iterations)
+    if rest or epoch not in task.config.template_epochs or task.store.frame.dim != 3:
+        return
+    lattice = Lattice(64)
+    mesh = isosurface(
+        evaluate_band(template_field(deformable(state.model)), lattice), lattice, task.store.frame
+    )
+    if len(mesh.faces):
+        with replacing(task.folder / "templates" / f"epoch_{epoch:05d}.ply") as temporary:
+            mesh.export(temporary)
+
+
+def measured(state: State, task: Task) -> dict[str, float]:
+    """Of surfaces that a template is deformed to, the share that folds."""
+    if task.store.frame.dim != 3 or not isinstance(state.model, DeformableModel):
+        return {}
+    return {"folded_share": _folded_share(state.model, state, task)}
+
+
+def _folded_share(model: DeformableModel, state: State, task: Task) -> float:
+    """Mean share of folded points near the surfaces of some training shapes, with their codes."""
+    some = np.random.default_rng(0).permutation(len(task.rows))[:FOLDING_SHAPES]
+    latents = residual_latents(state.codes.detach(), task.basis)[some]
+    return float(np.mean(folded_shares(model, task.covariates[some], latents, resolution=64)))

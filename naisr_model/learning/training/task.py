@@ -1,0 +1,181 @@
+"""A training as values: what does not change while it runs, and what does."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from naisr_model.config import Preset, TrainingConfig
+from naisr_model.data.store import SampleStore
+from naisr_model.errors import InputError
+from naisr_model.learning.training.residual import covariate_basis
+from naisr_model.models.base import AdditiveModel, ShapeModel
+from naisr_model.models.devices import usable_device
+from naisr_model.models.factory import build, model_class
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What does not change during a training.
+
+    Attributes:
+        store: the samples.
+        preset: networks and settings.
+        out: the checkpoint to write.
+        budget_s: seconds the training may take; infinite when it is bounded by epochs alone.
+        rows: the store's training rows, ``[n]``.
+        covariates: centred, of those rows, ``[n, N]``; those that the model depends on.
+        basis: orthonormal columns that are taken out of the codes, ``[n, K]``; none when they are free.
+        binary: columns of binary covariates.
+    """
+
+    store: SampleStore
+    preset: Preset
+    out: Path
+    budget_s: float
+    rows: NDArray[np.intp]
+    covariates: Tensor
+    basis: Tensor
+    binary: tuple[int, ...]
+
+    @property
+    def config(self) -> TrainingConfig:
+        """How it is optimised."""
+        return self.preset.training
+
+    @property
+    def folder(self) -> Path:
+        """Where the state, the log and the templates are kept."""
+        return self.out.with_name(self.out.name + ".training")
+
+    @property
+    def epoch_iterations(self) -> int:
+        """Batches that show every shape once."""
+        return math.ceil(len(self.rows) / self.config.batch_shapes)
+
+    @property
+    def iterations(self) -> int:
+        """Of the whole training, where no budget ends it."""
+        return self.config.epochs * self.epoch_iterations
+
+    @property
+    def fingerprint(self) -> str:
+        """Changes with the settings and with the data, which a resumed training must share."""
+        known = [repr(self.preset), self.store.folders, self.store.population.to_json()]
+        return hashlib.sha256(json.dumps(known).encode()).hexdigest()
+
+
+@dataclass
+class State:
+    """What changes during a training, and all that a resumed one needs.
+
+    Attributes:
+        model: in training.
+        codes: of the training shapes before anything is taken out of them, ``[n, L]``.
+        optimiser: of both; each of its groups names the setting that is its learning rate.
+        iteration: iterations done.
+        seconds: spent on them, earlier runs included.
+        running: mean of the loss of late.
+        best: the lowest such mean so far.
+    """
+
+    model: ShapeModel
+    codes: nn.Parameter
+    optimiser: torch.optim.Adam
+    iteration: int = 0
+    seconds: float = 0.0
+    running: float = math.inf
+    best: float = math.inf
+
+    def to_dict(self) -> dict[str, Any]:
+        """Tensors and numbers that :meth:`load` reads back."""
+        numbers = {name: getattr(self, name) for name in ("iteration", "seconds", "running", "best")}
+        return numbers | {
+            "network": self.model.state_dict(),
+            "codes": self.codes.detach(),
+            "optimiser": self.optimiser.state_dict(),
+        }
+
+    def load(self, record: dict[str, Any]) -> None:
+        """Become the state that :meth:`to_dict` gave."""
+        self.model.load_state_dict(record["network"])
+        self.codes.data.copy_(record["codes"])
+        self.optimiser.load_state_dict(record["optimiser"])
+        for name in ("iteration", "seconds", "running", "best"):
+            setattr(self, name, record[name])
+
+    def share(self, task: Task) -> float:
+        """How much is done, by iterations or by the time budget, whichever is nearer to its end."""
+        return max(self.iteration / task.iterations, self.seconds / task.budget_s)
+
+
+def make_task(store: SampleStore, preset: Preset, out: Path, budget_s: float, device: str) -> Task:
+    """The training that :func:`~naisr_model.learning.training.loop.train` is asked for.
+
+    Raises:
+        InputError: when settings, model and data do not fit, or torch cannot compute on ``device``.
+    """
+    if preset.network.dim != store.frame.dim:
+        raise InputError(
+            f"the preset is for {preset.network.dim}D shapes and the store holds {store.frame.dim}D ones; "
+            f"choose another preset"
+        )
+    _check(preset)
+    usable_device(device)
+    population = model_class(preset.model).relevant(store.population)
+    rows = np.flatnonzero(~population.held_out)
+    normalised = population.normalised()[rows]
+    binary = tuple(i for i, c in enumerate(population.covariates) if c.kind == "binary")
+    basis = covariate_basis(normalised, binary) if preset.training.residual_latents else normalised[:, :0]
+    return Task(
+        store=store,
+        preset=preset,
+        out=out,
+        budget_s=budget_s,
+        rows=rows,
+        covariates=torch.as_tensor(normalised, dtype=torch.float32, device=device),
+        basis=torch.as_tensor(basis, dtype=torch.float32, device=device),
+        binary=binary,
+    )
+
+
+def _check(preset: Preset) -> None:
+    """Refuse settings that say something of covariates or of a template to a model without them."""
+    config, model = preset.training, model_class(preset.model)
+    can, loss = model.capabilities, config.loss
+    wanted = (
+        ("population_share", config.population_share, can.evolvable),
+        ("residual_latents", config.residual_latents, can.evolvable),
+        ("template_epochs", config.template_epochs, can.has_template),
+        ("loss.template_eikonal", loss.template_eikonal, can.has_template),
+        ("loss.folding", loss.folding, can.deformable),
+        ("loss.centring", loss.centring, issubclass(model, AdditiveModel)),
+        ("loss.ridge", loss.ridge, issubclass(model, AdditiveModel)),
+    )
+    for name, value, is_possible in wanted:
+        if value and not is_possible:
+            raise InputError(
+                f"the setting 'training.{name}' is {value}, but {model.title} has no use for it; leave it out"
+            )
+
+
+def initial_state(task: Task) -> State:
+    """Before the first iteration: weights and codes drawn from the seed."""
+    config, network, device = task.config, task.preset.network, task.covariates.device
+    with torch.random.fork_rng():
+        torch.manual_seed(config.seed)
+        model = build(task.preset, len(task.store.population.covariates)).to(device)
+        codes = torch.randn(len(task.rows), network.latent) * config.loss.latent_sigma
+    parameter = nn.Parameter(codes.to(device))
+    rated = model.rated_parameters() | {"latent_rate": [parameter]}
+    optimiser = torch.optim.Adam([{"params": own, "setting": name} for name, own in rated.items()])
+    return State(model, parameter, optimiser)
