@@ -1,4 +1,4 @@
-"""What a command shows while it works and leaves when it is done: progress bars, Ctrl+C, figures."""
+"""What a command shows while it works and leaves when it is done: progress with Ctrl+C, figures."""
 
 from __future__ import annotations
 
@@ -6,34 +6,32 @@ import contextlib
 import json
 import signal
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
+from rich.progress import Progress as Bar
 
 from naisr_model.files import replacing
+from naisr_model.progress import Progress
 
 _console = Console(stderr=True)
 
 
 @contextlib.contextmanager
-def bar(label: str) -> Iterator[Callable[[float], None]]:
-    """A progress bar, moved by calling what it gives with the share that is done."""
-    with Progress(
-        TextColumn(label),
-        BarColumn(),
-        TextColumn("{task.percentage:.0f} %"),
-        TimeRemainingColumn(),
-        console=_console,
-    ) as shown:
+def bar(label: str) -> Iterator[Progress]:
+    """A bar that shows the progress it hands out, which Ctrl+C stops."""
+    columns = TextColumn(label), BarColumn(), TextColumn("{task.percentage:.0f} %"), TimeRemainingColumn()
+    with Bar(*columns, console=_console) as shown, stoppable() as silent:
         task = shown.add_task(label, total=1.0)
-        yield lambda share: shown.update(task, completed=share)
+        yield replace(silent, told=lambda share: shown.update(task, completed=share))
 
 
 @contextlib.contextmanager
-def training_bar() -> Iterator[Callable[[Any], None]]:
-    """A progress bar with epoch, loss and speed, moved by calling what it gives with a training's report."""
+def training_bar() -> Iterator[tuple[Progress, Callable[[Any], None]]]:
+    """A bar with epoch, loss and speed: the progress that Ctrl+C stops, and what is called with reports."""
     columns = (
         TextColumn("epoch {task.fields[epoch]}"),
         BarColumn(),
@@ -41,7 +39,7 @@ def training_bar() -> Iterator[Callable[[Any], None]]:
             "loss {task.fields[loss]:.3f}  {task.fields[speed]:,.0f} points/s  {task.fields[left]} left"
         ),
     )
-    with Progress(*columns, console=_console) as shown:
+    with Bar(*columns, console=_console) as shown, stoppable() as silent:
         task = shown.add_task("training", total=1.0, epoch=0, loss=float("nan"), speed=0.0, left="?")
 
         def report(told: Any) -> None:
@@ -55,12 +53,12 @@ def training_bar() -> Iterator[Callable[[Any], None]]:
                 left=f"{minutes}:{seconds:02d}",
             )
 
-        yield report
+        yield silent, report
 
 
 @contextlib.contextmanager
-def stoppable() -> Iterator[Callable[[], bool]]:
-    """Ctrl+C asks for a clean end; a second one ends at once."""
+def stoppable() -> Iterator[Progress]:
+    """A progress that shows nothing: Ctrl+C asks for a clean end; a second one ends at once."""
     asked = False
 
     def ask(_signal: int, _frame: object) -> None:
@@ -71,7 +69,7 @@ def stoppable() -> Iterator[Callable[[], bool]]:
 
     previous = signal.signal(signal.SIGINT, ask)
     try:
-        yield lambda: asked
+        yield Progress(is_unwanted=lambda: asked)
     finally:
         signal.signal(signal.SIGINT, previous)
 

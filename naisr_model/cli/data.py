@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from naisr_model.cli.console import bar, stoppable
+from naisr_model.cli.console import bar
 
 
 def populate(name: str, out: Path, *, patients: int | None = None, seed: int = 0) -> None:
@@ -19,8 +19,8 @@ def populate(name: str, out: Path, *, patients: int | None = None, seed: int = 0
     from naisr_model.data.populations import population
 
     size = {} if patients is None else {"patients": patients}
-    with bar(f"writing {name}") as progress, stoppable() as stop:
-        table = population(name).write_population(out, seed=seed, progress=progress, should_stop=stop, **size)
+    with bar(f"writing {name}") as progress:
+        table = population(name).write_population(out, seed=seed, progress=progress, **size)
     print(table)
 
 
@@ -55,8 +55,8 @@ def prepare(
     from naisr_model.data.prepare import prepare as run
 
     options = PrepareOptions(surface_samples, near_samples, uniform_samples, held_out, seed, workers)
-    with bar("preparing") as progress, stoppable() as stop:
-        report = run(table, out, options=options, progress=progress, should_stop=stop)
+    with bar("preparing") as progress:
+        report = run(table, out, options=options, progress=progress)
     for remark in report.rejected:
         print(f"rejected {remark.path} (row {remark.row}): {remark.reason}")
     for remark in report.warnings:

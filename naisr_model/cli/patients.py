@@ -12,13 +12,16 @@ from cyclopts import Parameter
 
 from naisr_model.cli.console import bar, stoppable, write_json
 from naisr_model.cli.options import AtlasFile, JsonFile, pairs
+from naisr_model.errors import InputError
 
-Patient = Annotated[Path, Parameter(help="a mesh, whole or in part, a label volume or a cloud of points.")]
+PatientFile = Annotated[
+    Path, Parameter(help="a mesh, whole or in part, a label volume or a cloud of points.")
+]
 
 
 @Parameter(name="*")
 @dataclasses.dataclass(frozen=True)
-class Reading:
+class IntakeOptions:
     """How a patient's file is read.
 
     Attributes:
@@ -36,23 +39,24 @@ class Reading:
     landmarks: Path | None = None
 
 
-_AS_IT_IS = Reading()
+_AS_IT_IS = IntakeOptions()
 
 
 def fit(
-    patient: Patient,
+    patient: PatientFile,
     *,
     atlas: AtlasFile,
-    reading: Reading = _AS_IT_IS,
+    reading: IntakeOptions = _AS_IT_IS,
     out: Annotated[
         Path | None, Parameter(help="folder for the fitted surface, a table and a picture.")
     ] = None,
     json_file: JsonFile = None,
 ) -> None:
     """Fit a patient's shape: covariates that are not given are inferred, all with 95 % intervals."""
-    from naisr_model.patients.evolution import fit_record, write_series
+    from naisr_model.patients.evolution import fit_record
+    from naisr_model.patients.series import write_series
 
-    fitted, intake = _fitted(patient, atlas, reading)
+    fitted, intake = _fitted(patient, _loaded(atlas), reading)
     record = fit_record(fitted)
     _tell_fit(fitted, record["alternatives"])
     if out is not None:
@@ -61,7 +65,7 @@ def fit(
 
 
 def transfer(
-    patient: Patient,
+    patient: PatientFile,
     *,
     atlas: AtlasFile,
     to: Annotated[
@@ -71,23 +75,23 @@ def transfer(
             "the others stay as known or as fitted."
         ),
     ],
-    reading: Reading = _AS_IT_IS,
+    reading: IntakeOptions = _AS_IT_IS,
     out: Annotated[Path | None, Parameter(help="folder for both surfaces, a table and a picture.")] = None,
     json_file: JsonFile = None,
 ) -> None:
     """Show a patient's shape at other covariates, as it is expected on another day."""
     from naisr_model.patients.evolution import parsed
 
-    fitted, intake = _fitted(patient, atlas, reading)
+    fitted, intake = _fitted(patient, _transferable(atlas), reading)
     moved = fitted.at(parsed(fitted.individual.atlas, pairs("--to", to)))
     _tell_series(fitted, intake, [fitted.individual, moved], out, json_file)
 
 
 def evolve(
-    patient: Patient,
+    patient: PatientFile,
     *,
     atlas: AtlasFile,
-    reading: Reading = _AS_IT_IS,
+    reading: IntakeOptions = _AS_IT_IS,
     along: Annotated[str, Parameter(help="the covariate that moves.")] = "age",
     start: Annotated[
         float | None, Parameter(name="--from", help="its first value; left out, the patient's.")
@@ -109,25 +113,40 @@ def evolve(
     """Follow a patient's shape along one covariate."""
     from naisr_model.patients.evolution import evolution
 
-    fitted, intake = _fitted(patient, atlas, reading)
+    fitted, intake = _fitted(patient, _transferable(atlas), reading)
     _tell_series(fitted, intake, evolution(fitted, along, start, stop, steps, path), out, json_file)
 
 
-def _fitted(patient: Path, atlas: Path, reading: Reading) -> tuple[Any, Any]:
-    """The fit, and how the file was brought into the frame of the atlas."""
+def _loaded(atlas: Path) -> Any:
     from naisr_model.atlas import Atlas
+
+    return Atlas.load(atlas)
+
+
+def _transferable(atlas: Path) -> Any:
+    """An atlas that knows a person at other covariates."""
+    loaded = _loaded(atlas)
+    if not loaded.capabilities.transferable:
+        raise InputError(
+            f"{loaded.model_title} does not carry shapes to other covariates; "
+            "see the shape itself with 'naisr fit'"
+        )
+    return loaded
+
+
+def _fitted(patient: Path, loaded: Any, reading: IntakeOptions) -> tuple[Any, Any]:
+    """The fit, and how the file was brought into the frame of the atlas."""
     from naisr_model.patients.evolution import parsed
     from naisr_model.patients.intake import take_in
 
-    loaded = Atlas.load(atlas)
     options = dataclasses.asdict(reading)
     known = parsed(loaded, pairs("--known", options.pop("known")))
-    with stoppable() as stop:
-        intake = take_in(patient, loaded, known, **options, should_stop=stop)
+    with stoppable() as progress:
+        intake = take_in(patient, loaded, known, **options, progress=progress)
     for sentence in intake.sentences:
         print(f"naisr: {sentence}", file=sys.stderr)
-    with bar("fitting") as progress, stoppable() as stop:
-        fitted = loaded.fit(intake.patient.mesh_mm, known, progress=progress, should_stop=stop)
+    with bar("fitting") as progress:
+        fitted = loaded.fit(intake.patient.mesh_mm, known, progress=progress)
     return fitted, intake
 
 
@@ -150,10 +169,10 @@ def _tell_fit(fitted: Any, alternatives: Sequence[Mapping[str, Any]]) -> None:
 def _tell_series(
     fitted: Any, intake: Any, people: Sequence[Any], out: Path | None, json_file: Path | None
 ) -> None:
-    from naisr_model.patients.evolution import write_series
+    from naisr_model.patients.series import write_series
 
-    with bar("measuring") as progress, stoppable() as stop:
-        records = write_series(out, people, progress=progress, should_stop=stop)
+    with bar("measuring") as progress:
+        records = write_series(out, people, progress=progress)
     for person, record in zip(people, records, strict=True):
         where = ", ".join(c.format(person.covariates[c.name]) for c in person.atlas.covariates)
         low, high = record["volume_low_cm3"], record["volume_high_cm3"]

@@ -40,7 +40,7 @@ _FEW_VOXELS = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Patient:
+class PatientShape:
     """A shape in the world frame of its scan.
 
     Attributes:
@@ -94,13 +94,13 @@ class Finding:
     topic: str
     sentence: str
     remedy: str
-    repair: Callable[[Patient], Patient] | None = field(default=None, compare=False, repr=False)
+    repair: Callable[[PatientShape], PatientShape] | None = field(default=None, compare=False, repr=False)
 
 
 # --- reading ------------------------------------------------------------------------------------
 
 
-def read_patient(path: str | Path, label: int | str | None = None) -> Patient:
+def read_patient(path: str | Path, label: int | str | None = None) -> PatientShape:
     """Read a mesh, a label volume or a cloud of points.
 
     Args:
@@ -118,11 +118,11 @@ def read_patient(path: str | Path, label: int | str | None = None) -> Patient:
         raise InputError(f"{path.name} is no label volume, so label {label} cannot be chosen; leave it out")
     if path.suffix.lower() in POINT_ENDINGS:
         points = read_points(path)
-        return Patient(_cloud(points), f"{path.name}, {len(points):,} points")
+        return PatientShape(_cloud(points), f"{path.name}, {len(points):,} points")
     return _from_mesh(path)
 
 
-def _from_mesh(path: Path) -> Patient:
+def _from_mesh(path: Path) -> PatientShape:
     if path.suffix.lower() not in meshes.READERS:
         known = sorted(meshes.READERS | POINT_ENDINGS | set(volumes.ENDINGS))
         raise InputError(f"{path.name} is not one of {', '.join(known)}; convert it first")
@@ -131,7 +131,7 @@ def _from_mesh(path: Path) -> Patient:
     # Beyond that, cleaning takes a minute, and decimation cleans as well.
     if 0 < len(mesh.faces) <= MOST_FACES:
         mesh = meshes.cleaned(mesh)
-    return Patient(mesh, f"{path.name}, {kind}", _stated_space(path))
+    return PatientShape(mesh, f"{path.name}, {kind}", _stated_space(path))
 
 
 def _stated_space(path: Path) -> Literal["LPS", "RAS", ""]:
@@ -145,7 +145,7 @@ def _cloud(points: NDArray[np.float64]) -> trimesh.Trimesh:
     return trimesh.Trimesh(points, np.zeros((0, 3), np.int64), process=False)
 
 
-def _from_labels(path: Path, volume: volumes.LabelVolume, label: int | str | None) -> Patient:
+def _from_labels(path: Path, volume: volumes.LabelVolume, label: int | str | None) -> PatientShape:
     sizes_cm3 = volumes.volumes_cm3(volume)
     if not sizes_cm3:
         raise InputError(f"{path.name} has no label; every voxel is 0, segment the scan first")
@@ -157,7 +157,7 @@ def _from_labels(path: Path, volume: volumes.LabelVolume, label: int | str | Non
         raise InputError(f"{path.name} has no label {label}; it has {listed}")
     surface = volumes.label_surface(volume, chosen)
     remarks = (*volume.remarks, *_label_remarks(volume, chosen, surface, sizes_cm3[chosen]))
-    return Patient(surface, f"{path.name}, label {volumes.titled(volume, chosen)}", "LPS", remarks)
+    return PatientShape(surface, f"{path.name}, label {volumes.titled(volume, chosen)}", "LPS", remarks)
 
 
 def _numbered(volume: volumes.LabelVolume, label: int | str) -> int | None:
@@ -229,7 +229,7 @@ def _is_number(text: str) -> bool:
 # --- checking -----------------------------------------------------------------------------------
 
 
-def check_patient(patient: Patient, frame: Frame) -> tuple[Finding, ...]:
+def check_patient(patient: PatientShape, frame: Frame) -> tuple[Finding, ...]:
     """Find what would spoil a fit, errors first.
 
     The position is judged too, so a scan is checked again after it was aligned.
@@ -250,7 +250,9 @@ def check_patient(patient: Patient, frame: Frame) -> tuple[Finding, ...]:
     return tuple(sorted((finding for finding in found if finding), key=lambda finding: finding.kind))
 
 
-def repaired(patient: Patient, frame: Frame) -> tuple[Patient, tuple[Finding, ...], tuple[Finding, ...]]:
+def repaired(
+    patient: PatientShape, frame: Frame
+) -> tuple[PatientShape, tuple[Finding, ...], tuple[Finding, ...]]:
     """Repair the errors that the program can repair.
 
     Returns:
@@ -270,7 +272,7 @@ def _topics(findings: list[Finding]) -> set[str]:
     return {finding.topic for finding in findings}
 
 
-def _unusable(patient: Patient) -> Finding | None:
+def _unusable(patient: PatientShape) -> Finding | None:
     points = np.asarray(patient.mesh_mm.vertices)
     if len(points) < FEWEST_POINTS:
         sentence = f"the shape has only {len(points)} points" if len(points) else "the shape is empty"
@@ -282,7 +284,7 @@ def _unusable(patient: Patient) -> Finding | None:
     return None
 
 
-def _is_flat(patient: Patient) -> bool:
+def _is_flat(patient: PatientShape) -> bool:
     points = np.asarray(patient.mesh_mm.vertices)
     spread = np.sqrt(np.maximum(np.linalg.eigvalsh(np.cov(points.T)), 0))
     if spread[0] <= _FLAT * spread[2]:
@@ -293,7 +295,7 @@ def _is_flat(patient: Patient) -> bool:
     return volume < meshes.FLAT_SHARE * area**1.5 / (6 * np.sqrt(np.pi))
 
 
-def _units(patient: Patient, frame: Frame) -> Finding | None:
+def _units(patient: PatientShape, frame: Frame) -> Finding | None:
     largest_mm = 2 * frame.scale_mm / BOX_MARGIN
     longest = float(np.ptp(patient.mesh_mm.vertices, axis=0).max())
     low, high = PLAUSIBLE_SIZE
@@ -310,7 +312,7 @@ def _units(patient: Patient, frame: Frame) -> Finding | None:
     return Finding("warning" if part else "error", "units", sentence, remedy)
 
 
-def _voxel_indices(patient: Patient) -> Finding | None:
+def _voxel_indices(patient: PatientShape) -> Finding | None:
     doubled = 2 * np.asarray(patient.mesh_mm.vertices)
     if np.abs(doubled - np.round(doubled)).max() > 1e-6:
         return None
@@ -318,7 +320,7 @@ def _voxel_indices(patient: Patient) -> Finding | None:
     return Finding("warning", "voxels", sentence, "scale it by the voxel size in mm if they are")
 
 
-def _position(patient: Patient, frame: Frame) -> Finding | None:
+def _position(patient: PatientShape, frame: Frame) -> Finding | None:
     points = frame.to_model(patient.mesh_mm.vertices)
     centre = (points.min(axis=0) + points.max(axis=0)) / 2
     remedy = "align it to the atlas (icp or landmarks)"
@@ -332,7 +334,7 @@ def _position(patient: Patient, frame: Frame) -> Finding | None:
     return Finding("warning", "outside", f"{outside:.0%} of the shape lies outside the atlas's box", remedy)
 
 
-def _space(patient: Patient) -> Finding | None:
+def _space(patient: PatientShape) -> Finding | None:
     if patient.space != "RAS":
         return None
     sentence = "the file says that its coordinates are RAS, while label volumes are read as LPS"
@@ -340,12 +342,12 @@ def _space(patient: Patient) -> Finding | None:
     return Finding("warning", "space", sentence, remedy, ras_to_lps)
 
 
-def _too_fine(patient: Patient) -> Finding:
+def _too_fine(patient: PatientShape) -> Finding:
     sentence = f"the surface has {len(patient.mesh_mm.faces):,} faces, more than a fit can use"
     return Finding("error", "fine", sentence, f"decimate it to about {MOST_FACES // 2:,}", decimated)
 
 
-def _inverted(patient: Patient) -> Finding | None:
+def _inverted(patient: PatientShape) -> Finding | None:
     turned = _outward(patient.mesh_mm)
     share = float((np.asarray(turned.faces) != patient.mesh_mm.faces).any(axis=1).mean())
     if not share:
@@ -368,7 +370,7 @@ def _volume_from_middle(mesh: trimesh.Trimesh) -> float:
     return float(np.einsum("ij,ij", heights, mesh.triangles_cross)) / 6
 
 
-def _components(patient: Patient) -> Finding | None:
+def _components(patient: PatientShape) -> Finding | None:
     areas = _component_areas(patient.mesh_mm)[1]
     if len(areas) < 2:
         return None
@@ -383,7 +385,7 @@ def _component_areas(mesh: trimesh.Trimesh) -> tuple[NDArray[np.int64], NDArray[
     return component, np.bincount(component, weights=mesh.area_faces).astype(np.float64)
 
 
-def _opening(patient: Patient) -> Finding | None:
+def _opening(patient: PatientShape) -> Finding | None:
     holes = hole_areas_mm2(patient.mesh_mm)
     if not len(holes):
         return None
@@ -422,29 +424,29 @@ def rim(mesh: trimesh.Trimesh) -> NDArray[np.int64]:
 # --- repairing ----------------------------------------------------------------------------------
 
 
-def moved(patient: Patient, transform: NDArray[np.float64]) -> Patient:
+def moved(patient: PatientShape, transform: NDArray[np.float64]) -> PatientShape:
     """The patient after a 4x4 matrix, such as that of an accepted alignment."""
     mesh = patient.mesh_mm.copy()
     mesh.apply_transform(transform)
     return replace(patient, mesh_mm=mesh, from_file=transform @ patient.from_file)
 
 
-def scaled(patient: Patient, factor: ArrayLike) -> Patient:
+def scaled(patient: PatientShape, factor: ArrayLike) -> PatientShape:
     """Coordinates times ``factor``: one number, or one an axis for voxels that are no cubes."""
     return moved(patient, np.diag([*np.broadcast_to(np.asarray(factor, float), 3), 1.0]))
 
 
-def ras_to_lps(patient: Patient) -> Patient:
+def ras_to_lps(patient: PatientShape) -> PatientShape:
     """Half a turn about z, which leads from RAS to LPS and back."""
     return replace(moved(patient, np.diag([-1.0, -1.0, 1.0, 1.0])), space="LPS")
 
 
-def flipped(patient: Patient) -> Patient:
+def flipped(patient: PatientShape) -> PatientShape:
     """Faces that look inward turned round."""
     return replace(patient, mesh_mm=_outward(patient.mesh_mm))
 
 
-def largest_component(patient: Patient) -> Patient:
+def largest_component(patient: PatientShape) -> PatientShape:
     """The component with the largest area alone; cavities, which are components too, are filled."""
     component, areas = _component_areas(patient.mesh_mm)
     mesh = patient.mesh_mm.copy()
@@ -453,7 +455,7 @@ def largest_component(patient: Patient) -> Patient:
     return replace(patient, mesh_mm=mesh)
 
 
-def decimated(patient: Patient, faces: int = MOST_FACES // 2) -> Patient:
+def decimated(patient: PatientShape, faces: int = MOST_FACES // 2) -> PatientShape:
     """About ``faces`` faces, by merging the vertices in each cell of a lattice.
 
     With quadrics, 300,000 faces take 15 s on one core; this takes 0.3 s, and the error is a small

@@ -221,7 +221,7 @@ def _remarks(metadata: Mapping[str, str]) -> tuple[str, ...]:
 
 
 def volumes_cm3(volume: LabelVolume) -> dict[int, float]:
-    """Volume of every label but 0 by label, counted in voxels, in cm3."""
+    """Volume of every label but 0 by label, counted in voxels, in cm³."""
     voxel_cm3 = float(np.prod(volume.spacing_mm)) / 1000
     counts: dict[int, int] = {}
     for layer in volume.labels.transpose(2, 0, 1):
@@ -237,9 +237,9 @@ def titled(volume: LabelVolume, label: int) -> str:
 
 
 def titles(volume: LabelVolume) -> dict[int, str]:
-    """The labels to choose from, each with its name and size: ``{2: "2 'airway': 41.9 cm3"}``."""
+    """The labels to choose from, each with its name and size: ``{2: "2 'airway': 41.9 cm³"}``."""
     sizes_cm3 = volumes_cm3(volume)
-    return {label: f"{titled(volume, label)}: {size:.3g} cm3" for label, size in sizes_cm3.items()}
+    return {label: f"{titled(volume, label)}: {size:.3g} cm³" for label, size in sizes_cm3.items()}
 
 
 def label_surface(volume: LabelVolume, label: int) -> trimesh.Trimesh:

@@ -1,31 +1,22 @@
-"""A fitted patient at other covariates: single steps, paths through time, and the files made of them."""
+"""A fitted patient at other covariates: single steps and paths through time."""
 
 from __future__ import annotations
 
 import csv
 import dataclasses
-import io
-from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyvista as pv
 from numpy.typing import NDArray
 
 from naisr_model.atlas import Atlas, Fit, Individual
 from naisr_model.covariates import complete, growth_path
-from naisr_model.errors import Cancelled, InputError
-from naisr_model.files import replacing
-
-Progress = Callable[[float], None]
-StopCheck = Callable[[], bool]
-
-PIXELS = 400
+from naisr_model.errors import InputError
 
 
 def fit_record(fit: Fit) -> dict[str, Any]:
-    """What is told of a fit, for JSON: real units, mm and cm3."""
+    """What is told of a fit, for JSON: real units, mm and cm³."""
     return {
         "covariates": fit.covariates,
         "inferred": list(fit.inferred),
@@ -126,73 +117,5 @@ def parsed(atlas: Atlas, texts: dict[str, str]) -> dict[str, float]:
     """
     known = {covariate.name: covariate for covariate in atlas.covariates}
     if unknown := [name for name in texts if name not in known]:
-        raise InputError(f"unknown covariate '{unknown[0]}'; this atlas has {', '.join(known)}")
+        raise InputError(f"unknown covariate '{unknown[0]}'; this atlas has {', '.join(known) or 'none'}")
     return {name: known[name].parse(text or "") for name, text in texts.items()}
-
-
-def write_series(
-    out: Path | None,
-    people: Sequence[Individual],
-    *,
-    progress: Progress | None = None,
-    should_stop: StopCheck | None = None,
-) -> list[dict[str, float | str]]:
-    """Measure each shape and, with ``out``, write it with a table and a picture into that folder.
-
-    Returns:
-        A record for each: covariates in real units, volume and its 95 % interval in cm3, mesh name.
-
-    Raises:
-        Cancelled: when ``should_stop()`` turned true.
-    """
-    records: list[dict[str, float | str]] = []
-    for number, person in enumerate(people, start=1):
-        if should_stop is not None and should_stop():
-            raise Cancelled
-        low, high = person.volume_interval_cm3
-        volumes = {"volume_cm3": person.volume_cm3, "volume_low_cm3": low, "volume_high_cm3": high}
-        records.append({**person.covariates, **volumes, "mesh": f"shape{number:02d}.stl"})
-        if out is not None:
-            with replacing(out / f"shape{number:02d}.stl") as temporary:
-                person.surface.export(temporary)
-        if progress is not None:
-            progress(number / len(people))
-    if out is not None:
-        _write_table(out / "volumes.csv", records)
-        _write_picture(out / "shapes.png", people)
-    return records
-
-
-def _title(person: Individual) -> str:
-    values = person.covariates
-    words = [covariate.format(values[covariate.name]) for covariate in person.atlas.covariates]
-    return f"{', '.join(words)}\n{person.volume_cm3:.1f} cm3"
-
-
-def _write_table(path: Path, records: Sequence[dict[str, float | str]]) -> None:
-    text = io.StringIO()
-    table = csv.DictWriter(text, list(records[0]), lineterminator="\n")
-    table.writeheader()
-    rounded = (
-        {key: round(value, 4) if isinstance(value, float) else value for key, value in record.items()}
-        for record in records
-    )
-    table.writerows(rounded)
-    with replacing(path) as temporary:
-        temporary.write_text(text.getvalue(), encoding="utf-8")
-
-
-def _write_picture(path: Path, people: Sequence[Individual]) -> None:
-    """The shapes side by side, at one scale and seen from one side."""
-    plotter = pv.Plotter(off_screen=True, shape=(1, len(people)), window_size=(PIXELS * len(people), PIXELS))
-    for column, person in enumerate(people):
-        plotter.subplot(0, column)
-        if len(person.surface.faces):
-            plotter.add_mesh(pv.wrap(person.surface), color="#d8c8b8", smooth_shading=True)
-        plotter.add_text(_title(person), font_size=8, color="black")
-    plotter.background_color = "white"
-    plotter.link_views()
-    plotter.view_yz()
-    with replacing(path) as temporary:
-        plotter.screenshot(temporary)
-    plotter.close()

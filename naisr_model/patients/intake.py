@@ -11,7 +11,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -22,10 +22,17 @@ from naisr_model.atlas import Atlas
 from naisr_model.covariates import Values
 from naisr_model.data import volumes
 from naisr_model.data.align import Landmarks, Method, Proposal, propose, read_landmarks
-from naisr_model.data.patients import Finding, Patient, check_patient, moved, read_patient, repaired, scaled
+from naisr_model.data.patients import (
+    Finding,
+    PatientShape,
+    check_patient,
+    moved,
+    read_patient,
+    repaired,
+    scaled,
+)
 from naisr_model.errors import InputError
-
-StopCheck = Callable[[], bool]
+from naisr_model.progress import SILENT, Progress
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +51,7 @@ class Intake:
         proposal: the motion that was made; None without alignment.
     """
 
-    patient: Patient
+    patient: PatientShape
     repairs: tuple[str, ...]
     findings: tuple[Finding, ...]
     method: Method = "none"
@@ -96,7 +103,7 @@ def take_in(
     scale: float | None = None,
     align: Method = "none",
     landmarks: Path | None = None,
-    should_stop: StopCheck | None = None,
+    progress: Progress = SILENT,
 ) -> Intake:
     """Read a patient's file and bring it into the frame of an atlas: :func:`read`, then :func:`aligned`.
 
@@ -108,14 +115,15 @@ def take_in(
         scale: millimetres per unit of the file; left out, it is guessed where the size is implausible.
         align: ``none``, ``icp`` or ``landmarks``.
         landmarks: a CSV name,x,y,z in the coordinates of the file; for ``landmarks``.
-        should_stop: polled while the atlas's shape is made and the motion is sought.
+        progress: told the share of the alignment: the atlas's shape is made, the motion is sought.
 
     Raises:
         InputError: when the file cannot be read or aligned, or what is wrong with it cannot be repaired.
-        Cancelled: when ``should_stop()`` turned true.
+        Cancelled: when nobody waits any more.
     """
-    intake = aligned(read(path, atlas, label, scale), atlas, known, align, landmarks, should_stop)
+    intake = aligned(read(path, atlas, label, scale), atlas, known, align, landmarks, progress)
     _stop_at_errors(path, intake.findings)
+    progress.tell(1.0)
     return intake
 
 
@@ -123,7 +131,7 @@ def labels(path: str | Path) -> dict[int, str] | None:
     """What :func:`read` may be asked for: of a label volume its labels, each with its name and size.
 
     Returns:
-        A title by label, as ``{2: "2 'airway': 41.9 cm3"}``, empty where every voxel is 0; None of a file
+        A title by label, as ``{2: "2 'airway': 41.9 cm³"}``, empty where every voxel is 0; None of a file
         that is no label volume.
 
     Raises:
@@ -158,7 +166,7 @@ def aligned(
     known: Values,
     method: Method,
     landmarks: Path | None = None,
-    should_stop: StopCheck | None = None,
+    progress: Progress = SILENT,
 ) -> Intake:
     """The patient moved onto the atlas's shape; who declines the proposal keeps ``intake``.
 
@@ -168,16 +176,16 @@ def aligned(
         known: covariates in real units; the patient is aligned to the atlas's shape at them.
         method: ``icp``, ``landmarks``, or ``none`` to leave everything as it is.
         landmarks: a CSV name,x,y,z in the coordinates of the file; for ``landmarks``.
-        should_stop: polled while the atlas's shape is made and the motion is sought.
+        progress: told the share of the alignment: the atlas's shape is made, the motion is sought.
 
     Raises:
         InputError: when landmarks are missing or too few, or no shape is there to align to.
-        Cancelled: when ``should_stop()`` turned true.
+        Cancelled: when nobody waits any more.
     """
     points = _landmarks(method, landmarks)
     if method == "none":
         return intake
-    proposal = _proposal(intake.patient, atlas, known, method, points, should_stop)
+    proposal = _proposal(intake.patient, atlas, known, method, points, progress)
     patient = moved(intake.patient, proposal.transform)
     return Intake(patient, intake.repairs, check_patient(patient, atlas.frame), method, proposal)
 
@@ -191,7 +199,7 @@ def _landmarks(align: Method, path: Path | None) -> Landmarks:
     return {} if path is None else read_landmarks(path)
 
 
-def _in_units(patient: Patient, scale: float | None) -> Patient:
+def _in_units(patient: PatientShape, scale: float | None) -> PatientShape:
     if scale is None:
         return patient
     if not 0 < scale < math.inf:
@@ -206,22 +214,22 @@ def _stop_at_errors(path: Path, findings: Sequence[Finding]) -> None:
 
 
 def _proposal(
-    patient: Patient,
+    patient: PatientShape,
     atlas: Atlas,
     known: Values,
     align: Method,
     landmarks: Landmarks,
-    should_stop: StopCheck | None,
+    progress: Progress,
 ) -> Proposal:
-    reference_mm = atlas.shape(known, should_stop=should_stop)
+    reference_mm = atlas.shape(known, progress=progress.part(0.0, 0.3))
     if not len(reference_mm.faces):
         raise InputError("there is no surface at these covariates to align to; give others as known")
     carried = {name: _moved_point(patient, point) for name, point in landmarks.items()}
     alignment = atlas.checkpoint.alignment
-    return propose(align, patient.mesh_mm, reference_mm, alignment, carried, should_stop)
+    return propose(align, patient.mesh_mm, reference_mm, alignment, carried, progress.part(0.3, 1.0))
 
 
-def _moved_point(patient: Patient, point: tuple[float, float, float]) -> tuple[float, float, float]:
+def _moved_point(patient: PatientShape, point: tuple[float, float, float]) -> tuple[float, float, float]:
     x, y, z = (patient.from_file @ np.array([*point, 1.0]))[:3].tolist()
     return x, y, z
 

@@ -15,10 +15,9 @@ from typing import Any, Protocol, cast
 
 import trimesh
 
+from naisr_model.data.align import Landmarks
 from naisr_model.errors import InputError
 from naisr_model.progress import SILENT, Progress
-
-Landmarks = dict[str, tuple[float, float, float]]
 
 POPULATIONS = MappingProxyType(
     {

@@ -19,6 +19,7 @@ import trimesh
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from naisr_model.data.align import Landmarks
 from naisr_model.data.populations.airway_anatomy import Variation, airway_landmarks, airway_mesh
 from naisr_model.data.populations.airway_growth import (
     MAX_AGE_MONTHS,
@@ -42,7 +43,6 @@ __all__ = [
     "write_population",
 ]
 
-Landmarks = dict[str, tuple[float, float, float]]
 
 COVARIATES_TOML = """\
 [alignment]

@@ -131,7 +131,7 @@ def test_one_of_several_labels_must_be_chosen(egg_atlas, tmp_path, capsys):
 def test_labels_can_be_listed_before_one_is_read(egg_atlas, tmp_path):
     path = label_volume(tmp_path / "scan.nrrd")
     titles = labels(path)
-    assert titles is not None and titles[1] == "1: 0.064 cm3" and titles[2].startswith("2 'egg': 58.")
+    assert titles is not None and titles[1] == "1: 0.064 cm³" and titles[2].startswith("2 'egg': 58.")
     assert labels(saved(egg(6.0, 1.0), tmp_path / "egg.stl")) is None
     intake = read(path, Atlas.load(egg_atlas), label=2)
     assert intake.is_ready and intake.proposal is None

@@ -9,7 +9,7 @@ import trimesh
 
 from naisr_model.data.patients import (
     MOST_FACES,
-    Patient,
+    PatientShape,
     check_patient,
     decimated,
     flipped,
@@ -39,7 +39,7 @@ def cloud(points) -> trimesh.Trimesh:
     return trimesh.Trimesh(points, np.zeros((0, 3), int), process=False)
 
 
-def topics(patient: Patient) -> list[str]:
+def topics(patient: PatientShape) -> list[str]:
     return [finding.topic for finding in check_patient(patient, FRAME)]
 
 
@@ -140,7 +140,7 @@ def labelled(tmp_path, name="scan.nii.gz"):
 @pytest.mark.parametrize("name", ["scan.nii.gz", "scan.nii", "scan.nrrd"])
 def test_a_label_is_chosen(tmp_path, name):
     path = labelled(tmp_path, name)
-    with pytest.raises(InputError, match=r"2 labels \(1: 7\.\d+ cm3, 4: 0\.\d+ cm3\); choose one"):
+    with pytest.raises(InputError, match=r"2 labels \(1: 7\.\d+ cm³, 4: 0\.\d+ cm³\); choose one"):
         read_patient(path)
     with pytest.raises(InputError, match="no label 9; it has 1: "):
         read_patient(path, label=9)
@@ -167,7 +167,7 @@ def test_a_volume_without_labels_is_rejected(tmp_path):
 @pytest.mark.parametrize(("unit", "mm"), [("metres", 1000.0), ("centimetres", 10.0), ("inches", 25.4)])
 def test_units_are_guessed_and_set_right(unit, mm):
     size = 0.55 if unit == "inches" else 1.0  # at full size inches could as well be small centimetres
-    patient = scaled(Patient(body()), size / mm)
+    patient = scaled(PatientShape(body()), size / mm)
     (finding,) = check_patient(patient, FRAME)
     assert (finding.kind, finding.topic) == ("error", "units")
     assert f"look like {unit}" in finding.sentence
@@ -177,7 +177,7 @@ def test_units_are_guessed_and_set_right(unit, mm):
 
 
 def test_a_size_that_no_unit_explains_is_left_to_a_person():
-    (finding,) = check_patient(scaled(Patient(body()), 7.0), FRAME)
+    (finding,) = check_patient(scaled(PatientShape(body()), 7.0), FRAME)
     assert finding.topic == "units" and finding.repair is None
     assert "840 mm long" in finding.sentence and "200 mm" in finding.sentence
 
@@ -186,7 +186,7 @@ def test_voxel_indices_are_suspected():
     grid = np.zeros((60, 60, 60), np.float32)
     grid[10:50, 15:45, 20:40] = 1
     surface = pyvista.wrap(grid).contour([0.5], method="flying_edges")
-    (finding,) = check_patient(Patient(trimesh.Trimesh(surface.points, surface.regular_faces)), FRAME)
+    (finding,) = check_patient(PatientShape(trimesh.Trimesh(surface.points, surface.regular_faces)), FRAME)
     assert finding.topic == "voxels"
     assert "voxel size" in finding.remedy
 
@@ -200,26 +200,26 @@ def test_unusable_shapes_are_errors():
     doubled = trimesh.Trimesh(sheet.vertices, np.vstack([sheet.faces, sheet.faces[:, ::-1]]), process=False)
     cases = {"empty": cloud(np.zeros((0, 3))), "numbers": broken, "flat": cloud(flat)}
     for topic, mesh in {**cases, "few": cloud(body().vertices[:9])}.items():
-        (finding,) = check_patient(Patient(mesh), FRAME)
+        (finding,) = check_patient(PatientShape(mesh), FRAME)
         assert (finding.kind, finding.topic) == ("error", "empty" if topic == "few" else topic)
-    assert topics(Patient(doubled)) == ["flat"]
+    assert topics(PatientShape(doubled)) == ["flat"]
 
 
 def test_a_shape_far_away_must_be_aligned():
     away = body()
     away.apply_translation([0, 0, 900.0])
-    (finding,) = check_patient(Patient(away), FRAME)
+    (finding,) = check_patient(PatientShape(away), FRAME)
     assert (finding.kind, finding.topic) == ("error", "far")
     assert "905 mm" in finding.sentence and "icp" in finding.remedy
     away.apply_translation([0, 0, -795.0])
-    (finding,) = check_patient(Patient(away), FRAME)
+    (finding,) = check_patient(PatientShape(away), FRAME)
     assert (finding.kind, finding.topic) == ("warning", "outside")
 
 
 def test_faces_that_look_inward_are_turned():
     inside_out = body()
     inside_out.invert()
-    patient, (finding,), left = repaired(Patient(inside_out), FRAME)
+    patient, (finding,), left = repaired(PatientShape(inside_out), FRAME)
     assert finding.topic == "inverted" and "100% of the faces" in finding.sentence and left == ()
     assert patient.mesh_mm.volume == pytest.approx(body().volume)
 
@@ -228,17 +228,19 @@ def test_an_open_surface_that_looks_inward_is_turned():
     part = body()
     part.update_faces(part.triangles_center[:, 0] < 20.0)
     part.remove_unreferenced_vertices()
-    outward = Patient(trimesh.Trimesh(part.vertices, part.faces, process=False))
+    outward = PatientShape(trimesh.Trimesh(part.vertices, part.faces, process=False))
     assert topics(outward) == ["open"]
     part.invert()
-    assert topics(Patient(part)) == ["inverted", "open"]
-    np.testing.assert_array_equal(flipped(Patient(part)).mesh_mm.face_normals, outward.mesh_mm.face_normals)
+    assert topics(PatientShape(part)) == ["inverted", "open"]
+    np.testing.assert_array_equal(
+        flipped(PatientShape(part)).mesh_mm.face_normals, outward.mesh_mm.face_normals
+    )
 
 
 def test_components_are_counted_and_the_largest_kept():
     crumb = trimesh.creation.icosphere(2, radius=3.0)
     crumb.apply_translation([70.0, 0.0, 0.0])
-    patient = Patient(body() + crumb)
+    patient = PatientShape(body() + crumb)
     (finding,) = check_patient(patient, FRAME)
     share = body().area / (body().area + crumb.area)
     assert (finding.kind, finding.topic) == ("warning", "components")
@@ -257,7 +259,7 @@ def test_holes_are_measured():
     cap_mm2 = 32 * 10.0**2 * np.sin(2 * np.pi / 64)
     np.testing.assert_allclose(hole_areas_mm2(tube), [cap_mm2, cap_mm2], rtol=1e-6)
     tube = tube.subdivide_to_size(20.0)
-    (finding,) = check_patient(Patient(tube), FRAME)
+    (finding,) = check_patient(PatientShape(tube), FRAME)
     assert (finding.kind, finding.topic) == ("warning", "open")
     assert f"2 holes of {2 * cap_mm2 / (2 * cap_mm2 + tube.area):.1%}" in finding.sentence
     assert not len(hole_areas_mm2(body()))
@@ -280,11 +282,11 @@ def test_stated_ras_is_told(tmp_path):
 def test_a_very_fine_surface_is_decimated():
     fine = trimesh.creation.torus(50.0, 20.0, major_sections=900, minor_sections=300)
     assert len(fine.faces) > MOST_FACES
-    patient, (finding,), left = repaired(Patient(fine), FRAME)
+    patient, (finding,), left = repaired(PatientShape(fine), FRAME)
     assert finding.topic == "fine" and left == ()
     assert len(patient.mesh_mm.faces) < MOST_FACES
     assert patient.is_closed
     assert patient.mesh_mm.volume == pytest.approx(fine.volume, rel=1e-3)
-    coarse = np.asarray(decimated(Patient(fine), 20_000).mesh_mm.vertices)
+    coarse = np.asarray(decimated(PatientShape(fine), 20_000).mesh_mm.vertices)
     ring = np.linalg.norm(coarse[:, :2], axis=1) - 50
     np.testing.assert_allclose(np.hypot(ring, coarse[:, 2]), 20.0, atol=0.1)

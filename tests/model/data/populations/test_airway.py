@@ -67,7 +67,7 @@ def test_volumes_follow_the_published_percentiles() -> None:
         for age, weight, sex, _ in PUBLISHED
     ]
     error = np.log(ours) - np.log(PUBLISHED[:, 3])
-    # Two of the eleven patients are far from any smooth curve (27 cm3 at 89 months, 71 at 111).
+    # Two of the eleven patients are far from any smooth curve (27 cm³ at 89 months, 71 at 111).
     assert np.median(np.abs(error)) < 0.12
     assert np.abs(error).max() < 0.5
     assert abs(error.mean()) < 0.1

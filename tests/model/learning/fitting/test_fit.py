@@ -3,20 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 
 import numpy as np
 import pytest
-import trimesh
 from eggs import egg
 
-from naisr_model import cli
-from naisr_model.config import FitConfig
 from naisr_model.covariates import growth_path
 from naisr_model.errors import Cancelled, InputError
-from naisr_model.evaluation.studies.fit_speed import compare_fits, comparison_markdown
-from naisr_model.evaluation.studies.reconstruction import HeldOut
-from naisr_model.patients.evolution import along_only, evolution, write_series
 from naisr_model.progress import Progress
 
 
@@ -132,79 +125,3 @@ def test_the_growth_path_follows_the_population(atlas):
     path = growth_path(atlas.population, "age", np.array([2.0, 5.0, 8.0]))
     assert path[:, 0] == pytest.approx([2, 5, 8])
     assert np.abs(path[:, 1]).max() < 0.5  # girls and boys alternate along age
-
-
-def test_evolution_and_its_files(atlas, made, tmp_path):
-    fit = atlas.fit(made[2], made[0])
-    people = evolution(fit, "age", None, 9.0, 3, "population")
-    assert [one.covariates["age"] for one in people] == pytest.approx([6.5, 7.75, 9.0])
-    assert all(one.covariates["sex"] == 1 for one in people)
-    only = along_only(fit, "age", np.array([8.0]))[0]
-    effect = atlas.effect("age", 8.0, only.latent, 32)
-    assert only.shape(32).volume == pytest.approx(effect.volume, rel=1e-4)
-    records = write_series(tmp_path, people[:1])
-    assert {path.name for path in tmp_path.iterdir()} == {"shape01.stl", "volumes.csv", "shapes.png"}
-    low, middle, high = (records[0][f"volume_{end}cm3"] for end in ("low_", "", "high_"))
-    assert float(low) < float(middle) < float(high)
-    table = tmp_path / "path.csv"
-    table.write_text("age\n3\n4\n")
-    assert [one.covariates["age"] for one in evolution(fit, "age", None, None, 1, str(table))] == [3, 4]
-    table.write_text("height\n3\n")
-    with pytest.raises(InputError, match="unknown covariate 'height'"):
-        evolution(fit, "age", None, None, 1, str(table))
-
-
-def test_the_fast_fit_is_compared_with_the_paper_s(atlas, made):
-    shapes = [HeldOut(made[0], made[2])]
-    config = FitConfig(steps=40, rate=2e-2)
-    report = compare_fits(atlas, shapes, config)
-    assert report["n"] == 1 and report["no_worse"] in (0, 1) and report["times_faster"] > 0
-    assert max(report["residual_mm"].values()) < 0.2
-    assert "40 Adam steps" in comparison_markdown(report, config)
-
-
-@pytest.fixture(scope="module")
-def patient(made, tmp_path_factory):
-    path = tmp_path_factory.mktemp("patient") / "scan.stl"
-    made[2].export(path)
-    return path
-
-
-def test_the_command_tells_what_python_tells(atlas, egg_atlas, patient, tmp_path, capsys):
-    target = tmp_path / "fit.json"
-    assert cli.main(["fit", str(patient), "--atlas", str(egg_atlas), "--json", str(target)]) == 0
-    said, record = capsys.readouterr().out, json.loads(target.read_text())
-    fit = atlas.fit(trimesh.load_mesh(patient))
-    assert record["covariates"]["age"] == pytest.approx(fit.covariates["age"], abs=0.1)
-    assert record["intervals"].keys() == {"age", "sex"} and record["inferred"] == ["age", "sex"]
-    assert record["volume_interval_cm3"][0] < record["volume_cm3"] < record["volume_interval_cm3"][1]
-    assert f"volume: {record['volume_cm3']:.1f} cm³" in said and "residual:" in said
-
-
-def test_transfer_and_evolve_write_shapes_and_tables(egg_atlas, patient, tmp_path, capsys):
-    given = [str(patient), "--atlas", str(egg_atlas), "--known", "age=6.5,sex=M", "--out", str(tmp_path)]
-    assert cli.main(["transfer", *given, "--to", "age=8"]) == 0
-    said = capsys.readouterr().out
-    assert "8 years, M:" in said
-    assert "at other covariates 90% of what sets" in said  # nobody was seen twice
-    assert len((tmp_path / "volumes.csv").read_text().splitlines()) == 3
-    ways = ["--from", "3", "--to", "4", "--steps", "3", "--path", "only"]
-    assert cli.main(["evolve", *given, *ways]) == 0
-    assert len(list(tmp_path.glob("shape*.stl"))) == 3
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["fit", "PATIENT", "--known", "age"], "'age' after --known is not understood"),
-        (["fit", "PATIENT", "--known", "height=3"], "unknown covariate 'height'"),
-        (["fit", "nowhere.stl"], "nowhere.stl"),
-        (["transfer", "PATIENT", "--to", "age=99"], "the atlas was trained on 1 to"),
-        (["evolve", "PATIENT", "--along", "height"], "unknown covariate 'height'"),
-        (["evolve", "PATIENT", "--path", "nowhere.csv"], "the path nowhere.csv cannot be read"),
-    ],
-)
-def test_what_a_command_cannot_use_gets_a_sentence(egg_atlas, patient, words, message, capsys):
-    given = [str(patient) if word == "PATIENT" else word for word in words]
-    assert cli.main([*given, "--atlas", str(egg_atlas)]) == 2
-    assert message in capsys.readouterr().err

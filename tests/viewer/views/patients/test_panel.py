@@ -497,7 +497,7 @@ def test_every_ending_that_the_model_reads_can_be_chosen(panel, monkeypatch):
 
 
 def test_a_label_is_chosen_by_its_title(panel):
-    labels = Labels(Reading(Path("/scans/p01.nii.gz")), ((1, "1: 3.2 cm3"), (4, "4 'airway': 41.9 cm3")))
+    labels = Labels(Reading(Path("/scans/p01.nii.gz")), ((1, "1: 3.2 cm³"), (4, "4 'airway': 41.9 cm³")))
 
     def answer(key: Qt.Key) -> None:
         dialog = QApplication.activeModalWidget()
