@@ -8,15 +8,20 @@ from collections.abc import Sequence
 from cyclopts import App, CycloptsError
 
 from naisr_model import __version__
-from naisr_model.cli import atlases, data, evaluating, patients
+from naisr_model.cli import atlases, benchmarking, data, patients
 from naisr_model.errors import Cancelled, InputError
 
 COMMANDS = (
     *(data.populate, data.prepare),
-    *(atlases.train, atlases.mesh),
     *(patients.fit, patients.transfer, patients.evolve),
-    *(atlases.info, evaluating.evaluate, evaluating.bench),
+    *(atlases.info, atlases.mesh, benchmarking.bench),
 )
+
+TRAINING = """Train an atlas; stop it whenever you like, the same command goes on.
+
+OUT can be opened from the first minute on; OUT.training/ beside it keeps the state to resume from, a
+TensorBoard log and the template at chosen epochs.
+"""
 
 app = App(
     name="naisr",
@@ -25,6 +30,13 @@ app = App(
 )
 for _command in COMMANDS:
     app.command(_command)
+# What these offer comes from the models and the studies, which load torch; so only when they are asked for.
+app.command(
+    "naisr_model.cli.training:train",
+    name="train",
+    help=TRAINING,
+)
+app.command("naisr_model.cli.evaluating:evaluate", name="evaluate", help="Measure how good an atlas is.")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

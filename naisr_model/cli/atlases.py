@@ -1,68 +1,16 @@
-"""Commands that make an atlas and show what is in it: ``train``, ``info`` and ``mesh``."""
+"""Commands that show what is in an atlas: ``info`` and ``mesh``."""
 
 from __future__ import annotations
 
 import dataclasses
-import math
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from cyclopts import Parameter
 
-from naisr_model.cli.console import stoppable, training_bar
-from naisr_model.cli.options import AtlasFile, covariate_values, seconds
+from naisr_model.cli.options import AtlasFile, covariate_values
 from naisr_model.errors import InputError
 from naisr_model.files import replacing
-
-
-def train(
-    store: Path,
-    *,
-    out: Path,
-    preset: str = "demo",
-    config: Path | None = None,
-    epochs: int | None = None,
-    time_budget: str | None = None,
-    seed: int | None = None,
-    device: str = "cpu",
-) -> None:
-    """Train an atlas; stop it whenever you like, the same command goes on.
-
-    OUT can be opened from the first minute on; OUT.training/ beside it keeps the state to resume
-    from, a TensorBoard log and the template at chosen epochs.
-
-    Args:
-        store: made by 'naisr prepare'.
-        out: the .safetensors file to write.
-        preset: demo (two CPU cores), paper-airway, paper-hippocampus or paper-starman.
-        config: a TOML file with settings on top of the preset.
-        epochs: passes over the training shapes.
-        time_budget: train for about so long, as 90s, 45m or 1.5h.
-        seed: of the initial weights and of every draw.
-        device: cpu, cuda or mps.
-    """
-    from naisr_model.config import preset as named
-    from naisr_model.config import read_toml
-    from naisr_model.data.store import SampleStore
-    from naisr_model.learning.training.loop import train as run
-
-    budget = math.inf if time_budget is None else seconds(time_budget)
-    chosen = named(preset) if config is None else read_toml(config, named(preset))
-    changes: dict[str, Any] = {"epochs": epochs, "seed": seed}
-    training = dataclasses.replace(chosen.training, **{k: v for k, v in changes.items() if v is not None})
-    with training_bar() as report, stoppable() as stop:
-        checkpoint = run(
-            SampleStore.open(store),
-            dataclasses.replace(chosen, training=training),
-            out,
-            time_budget_s=budget,
-            report=report,
-            should_stop=stop,
-            device=device,
-        )
-    print(f"{out} after {checkpoint.training['iterations']} iterations")
-    if "folded_share" in checkpoint.training:
-        print(f"folded points near the surface: {100 * checkpoint.training['folded_share']:.2f} %")
 
 
 def info(atlas: AtlasFile) -> None:
@@ -73,6 +21,10 @@ def info(atlas: AtlasFile) -> None:
     population = checkpoint.population
     held_out = int(population.held_out.sum())
     weights = sum(tensor.numel() for tensor in checkpoint.weights.values())
+    model = checkpoint.model()
+    abilities = [
+        name.replace("_", " ") for name, can in dataclasses.asdict(model.capabilities).items() if can
+    ]
     print(
         f"{checkpoint.name}: {len(population)} shapes of {len(set(population.subjects))} subjects, ", end=""
     )
@@ -80,6 +32,7 @@ def info(atlas: AtlasFile) -> None:
     for covariate in population.covariates:
         low, high = (covariate.format(value) for value in covariate.range)
         print(f"  {covariate.name}: {low} to {high}, centre {covariate.format(covariate.centre)}")
+    print(f"model: {model.title}: {', '.join(abilities)}")
     print(f"networks: {weights:,} weights, latent code of {checkpoint.preset.network.latent}")
     print(f"box: {2 * checkpoint.frame.scale_mm:.0f} mm wide, alignment by {checkpoint.alignment.method}")
     for key, value in {**checkpoint.source, **checkpoint.training}.items():
@@ -116,10 +69,16 @@ def mesh(
     if template and (effect is not None or set):
         raise InputError("the template depends on no covariate; leave out --effect and --set")
     loaded = Atlas.load(atlas, device)
+    if set and not loaded.covariates:
+        raise InputError(f"shapes of {loaded.model_title} depend on no covariates; leave out --set")
     values = covariate_values(set or [], loaded.covariates)
     if template:
+        if not loaded.capabilities.has_template:
+            raise InputError(f"{loaded.model_title} has no template; leave out --template")
         surface = loaded.template(resolution)
     elif effect is not None:
+        if not loaded.capabilities.disentangleable:
+            raise InputError(f"{loaded.model_title} does not tell covariates apart; leave out --effect")
         if values.keys() != {effect}:
             raise InputError(f"--effect {effect} needs its value and no other, as --set {effect}=VALUE")
         surface = loaded.effect(effect, values[effect], None, resolution, extrapolate=extrapolate)

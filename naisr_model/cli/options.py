@@ -18,16 +18,6 @@ AtlasFile = Annotated[Path, Parameter(help="the .safetensors file.")]
 JsonFile = Annotated[Path | None, Parameter(name="--json", help="also write the figures to this file.")]
 
 
-def require_at_least(option: str, value: int, least: int) -> None:
-    """Refuse a count that is too small.
-
-    Raises:
-        InputError: when ``value`` is below ``least``.
-    """
-    if value < least:
-        raise InputError(f"{option} is {value}; give {least} or more")
-
-
 def pairs(option: str, text: str) -> dict[str, str]:
     """``age=84,sex=M`` as names and texts.
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import KW_ONLY, asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import igl
@@ -13,12 +14,17 @@ from numpy.typing import NDArray
 
 from naisr_model.atlas import Atlas
 from naisr_model.errors import InputError
+from naisr_model.evaluation.held_out import (
+    HeldOut,
+    held_out,
+    held_out_rows,
+    opened,
+    require_shapes,
+)
+from naisr_model.evaluation.journal import Record
 from naisr_model.evaluation.metrics import volume_difference_cm3
 from naisr_model.evaluation.reports import markdown_table, mean_and_median, pair_cell
-from naisr_model.evaluation.studies.reconstruction import HeldOut, is_inside
-
-Progress = Callable[[float], None]
-StopCheck = Callable[[], bool]
+from naisr_model.progress import SILENT, Progress
 
 SHARE = 1 / 3
 """Of the area, cut away."""
@@ -69,43 +75,95 @@ class Completed:
     held: bool | None
 
 
-def completion(
-    atlas: Atlas,
-    shapes: Sequence[HeldOut],
-    *,
-    progress: Progress | None = None,
-    should_stop: StopCheck | None = None,
-) -> dict[str, Any]:
-    """Cut each shape in every way of :data:`CUTS`, fit what is left and measure both parts.
+@dataclass(frozen=True)
+class WholeShape:
+    """A held-out shape that is cut in every way.
 
-    Args:
-        atlas: what is fitted.
-        shapes: held-out shapes; those with covariates outside the observed ranges are left out.
-        progress: told the finished share.
-        should_stop: polled between steps.
-
-    Returns:
-        ``n`` shapes; under each cut and each of :data:`WAYS` the mean and the median of each column and the
-        share ``held`` of true volumes inside their interval, over ``n`` fits with a surface; ``definitions``.
-
-    Raises:
-        InputError: when no shape is left.
-        Cancelled: when ``should_stop()`` turned true.
+    Attributes:
+        row: of the population.
+        seed: of the random vertex that a hole is cut around.
     """
-    inside = [shape for shape in shapes if is_inside(atlas.population, shape.values)]
-    if not inside:
-        raise InputError("no shape inside the observed ranges was held out; prepare with --held-out 0.2")
-    found: dict[str, dict[str, list[Completed]]] = {cut: {way: [] for way in WAYS} for cut in CUTS}
-    for number, shape in enumerate(inside):
-        average = atlas.shape(shape.values, should_stop=should_stop)
-        for done, cut in enumerate(CUTS, start=1):
-            missing = cut_away(shape.mesh_mm, cut, seed=number)
-            for way, result in _completed(atlas, shape, missing, average, should_stop).items():
-                found[cut][way] += [result] if result else []
-            if progress is not None:
-                progress((number + done / len(CUTS)) / len(inside))
-    records = {cut: {way: _record(results) for way, results in ways.items()} for cut, ways in found.items()}
-    return {"n": len(inside), **records, "definitions": list(DEFINITIONS)}
+
+    row: int
+    seed: int
+
+    @property
+    def key(self) -> str:
+        """The row."""
+        return f"row {self.row}"
+
+
+@dataclass(frozen=True)
+class Completion:
+    """Cut a third of each held-out surface away and measure how well a fit of the rest completes it.
+
+    Attributes:
+        atlas: the .safetensors file.
+        store: where its held-out shapes are; not needed for the synthetic populations, which are made
+            again from their seed.
+        limit: at most so many held-out shapes; 0 takes all.
+    """
+
+    atlas: Path
+    _: KW_ONLY
+    store: Path | None = None
+    limit: int = 0
+
+    def cases(self) -> list[WholeShape]:
+        """The held-out shapes whose covariates are inside the observed ranges.
+
+        Raises:
+            InputError: when none is to be had.
+        """
+        atlas = opened(self.atlas)
+        require_shapes(atlas, self.store, self.limit)
+        rows = held_out_rows(atlas, self.limit)
+        inside = [row for row in rows if atlas.population.contains(atlas.population.row(row))]
+        if not inside:
+            raise InputError("no shape inside the observed ranges was held out; prepare with --held-out 0.2")
+        return [WholeShape(row, seed) for seed, row in enumerate(inside)]
+
+    def measure(self, case: WholeShape, progress: Progress = SILENT) -> Record:
+        """Each of :data:`CUTS` in each of :data:`WAYS`: a :class:`Completed`, or null without a surface.
+
+        Raises:
+            Cancelled: when nobody waits any more.
+        """
+        atlas = opened(self.atlas)
+        shape = held_out(atlas, self.store, case.row)
+        average = atlas.shape(shape.values, progress=progress.quiet)
+        found = {}
+        for cut, piece in progress.over(CUTS):
+            missing = cut_away(shape.mesh_mm, cut, case.seed)
+            results = _completed(atlas, shape, missing, average, piece)
+            found[cut] = {way: result and asdict(result) for way, result in results.items()}
+        return found
+
+    def summarise(self, records: Sequence[Record]) -> Record:
+        """The report.
+
+        Returns:
+            ``n`` shapes; under each cut and each of :data:`WAYS` the mean and the median of each column and
+            the share ``held`` of true volumes inside their interval, over ``n`` fits with a surface;
+            ``definitions``.
+        """
+        cuts = {
+            cut: {way: _record([one[cut][way] for one in records if one[cut][way]]) for way in WAYS}
+            for cut in CUTS
+        }
+        return {"n": len(records), **cuts, "definitions": list(DEFINITIONS)}
+
+    def markdown(self, report: Mapping[str, Any]) -> str:
+        """The report as a table with its definitions."""
+        rows = []
+        for cut, title in CUTS.items():
+            for way, label in WAYS.items():
+                record = report[cut][way]
+                held = "–" if record["held"] is None else f"{record['held']:.0%}"
+                rows.append([f"{title}, {label}", *(pair_cell(record[name]) for name in COLUMNS), held])
+        table = markdown_table(["", *COLUMNS.values(), "volume inside its 95 % interval"], rows)
+        notes = "\n".join(f"- {text}." for text in report["definitions"])
+        return f"**A third cut away, {report['n']} held-out shapes, mean / median**\n\n{table}\n\n{notes}\n"
 
 
 def cut_away(mesh_mm: trimesh.Trimesh, cut: str, seed: int = 0) -> NDArray[np.bool_]:
@@ -136,16 +194,17 @@ def _completed(
     shape: HeldOut,
     missing: NDArray[np.bool_],
     average: trimesh.Trimesh,
-    should_stop: StopCheck | None,
+    progress: Progress,
 ) -> dict[str, Completed | None]:
     seen_mm = _part(shape.mesh_mm, ~missing)
     true_cm3 = shape.mesh_mm.volume / 1000
     results: dict[str, Completed | None] = {}
-    for way, known in (("given", shape.values), ("inferred", {})):
-        fit = atlas.fit(seen_mm, known, should_stop=should_stop)
+    for (way, known), piece in progress.over([("given", shape.values), ("inferred", {})]):
+        fit = atlas.fit(seen_mm, known, progress=piece)
         low, high = fit.volume_interval_cm3
-        results[way] = _measured(shape, missing, fit.individual.surface, bool(low <= true_cm3 <= high))
-    return {**results, "average": _measured(shape, missing, average, None)}
+        held = bool(low <= true_cm3 <= high)
+        results[way] = completed(shape.mesh_mm, missing, fit.individual.surface, held)
+    return {**results, "average": completed(shape.mesh_mm, missing, average)}
 
 
 def _part(mesh_mm: trimesh.Trimesh, faces: NDArray[np.bool_]) -> trimesh.Trimesh:
@@ -154,21 +213,29 @@ def _part(mesh_mm: trimesh.Trimesh, faces: NDArray[np.bool_]) -> trimesh.Trimesh
     return part
 
 
-def _measured(
-    shape: HeldOut, missing: NDArray[np.bool_], fitted_mm: trimesh.Trimesh, held: bool | None
+def completed(
+    true_mm: trimesh.Trimesh,
+    missing: NDArray[np.bool_],
+    fitted_mm: trimesh.Trimesh,
+    held: bool | None = None,
 ) -> Completed | None:
-    """Nothing where the fit has no surface."""
+    """How far a surface is from the true one; nothing where it is empty.
+
+    Args:
+        true_mm: the true surface.
+        missing: which of its faces were cut away.
+        fitted_mm: the surface that is judged.
+        held: whether the true volume is inside the interval of the fit.
+    """
     if not len(fitted_mm.faces):
         return None
-    away_mm, seen_mm = (
-        _distances_mm(_part(shape.mesh_mm, faces), fitted_mm) for faces in (missing, ~missing)
-    )
+    away_mm, seen_mm = (_distances_mm(_part(true_mm, faces), fitted_mm) for faces in (missing, ~missing))
     return Completed(
         missing_mm=float(away_mm.mean()),
         missing_hd95_mm=float(np.percentile(away_mm, 95)),
         seen_mm=float(seen_mm.mean()),
         seen_hd95_mm=float(np.percentile(seen_mm, 95)),
-        vd_cm3=volume_difference_cm3(shape.mesh_mm, fitted_mm),
+        vd_cm3=volume_difference_cm3(true_mm, fitted_mm),
         held=held,
     )
 
@@ -180,21 +247,7 @@ def _distances_mm(true_mm: trimesh.Trimesh, fitted_mm: trimesh.Trimesh) -> NDArr
     return np.sqrt(np.asarray(igl.point_mesh_squared_distance(points, vertices, faces)[0]))
 
 
-def _record(results: Sequence[Completed]) -> dict[str, Any]:
-    rows = [asdict(result) for result in results]
+def _record(rows: Sequence[Record]) -> Record:
     held = [row["held"] for row in rows if row["held"] is not None]
     columns = {name: mean_and_median([row[name] for row in rows]) for name in COLUMNS}
     return {"n": len(rows), **columns, "held": float(np.mean(held)) if held else None}
-
-
-def completion_markdown(report: Mapping[str, Any]) -> str:
-    """The report of :func:`completion` as a table with its definitions."""
-    rows = []
-    for cut, title in CUTS.items():
-        for way, label in WAYS.items():
-            record = report[cut][way]
-            held = "–" if record["held"] is None else f"{record['held']:.0%}"
-            rows.append([f"{title}, {label}", *(pair_cell(record[name]) for name in COLUMNS), held])
-    table = markdown_table(["", *COLUMNS.values(), "volume inside its 95 % interval"], rows)
-    notes = "\n".join(f"- {text}." for text in report["definitions"])
-    return f"**A third cut away, {report['n']} held-out shapes, mean / median**\n\n{table}\n\n{notes}\n"

@@ -9,23 +9,35 @@ where everybody was seen once; there what a fit leaves out as not lasting counts
 
 from __future__ import annotations
 
-import dataclasses
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import KW_ONLY, asdict, dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import trimesh
 
-from naisr_model.atlas import Atlas, Fit, Individual
+from naisr_model.atlas import Atlas, Fit
 from naisr_model.covariates import Population
-from naisr_model.data.populations import PopulationModule
-from naisr_model.data.store import SampleStore
-from naisr_model.errors import Cancelled, InputError
+from naisr_model.errors import InputError
+from naisr_model.evaluation import published
+from naisr_model.evaluation.held_out import (
+    HeldOut,
+    aligned,
+    held_out,
+    held_out_rows,
+    known_population,
+    opened,
+    require_shapes,
+    source_visits,
+    synthetic,
+)
+from naisr_model.evaluation.journal import Record
 from naisr_model.evaluation.metrics import Distances, compare
+from naisr_model.evaluation.published import Published
 from naisr_model.evaluation.reports import (
     COLUMNS,
-    Published,
     definitions,
     distance_cells,
     markdown_table,
@@ -33,17 +45,7 @@ from naisr_model.evaluation.reports import (
     published_cells,
     summary,
 )
-from naisr_model.evaluation.studies.reconstruction import (
-    HeldOut,
-    aligned,
-    held_out_shapes,
-    is_inside,
-    source_visits,
-    synthetic,
-)
-
-Progress = Callable[[float], None]
-StopCheck = Callable[[], bool]
+from naisr_model.progress import SILENT, Progress
 
 WAYS = {
     "given": "fitted, covariates given",
@@ -53,42 +55,22 @@ WAYS = {
 }
 QUESTIONS = {"visits": "Other visits", "counterfactuals": "Same person, other covariates"}
 
-PUBLISHED_NOTE = "NAISR (ICLR 2024), Table 3, other visits of real patients, so other shapes than these"
+
+@dataclass(frozen=True)
+class HeldOutSubject:
+    """A held-out person, by name."""
+
+    name: str
+
+    @property
+    def key(self) -> str:
+        """The name."""
+        return self.name
 
 
-@dataclass(frozen=True, eq=False)
-class Prediction:
-    """One way to predict a shape, measured.
-
-    Attributes:
-        distances: from the truth; None where nothing was predicted.
-        volume_cm3: predicted.
-        interval_cm3: of the volume, 95 %; None where there is none.
-    """
-
-    distances: Distances | None
-    volume_cm3: float
-    interval_cm3: tuple[float, float] | None
-
-
-@dataclass(frozen=True, eq=False)
-class Case:
-    """A person seen once, and predicted elsewhere in every way of :data:`WAYS`."""
-
-    seen: HeldOut
-    truth: HeldOut
-    ways: Mapping[str, Prediction]
-
-
-def transfer(
-    atlas: Atlas,
-    store: SampleStore | None = None,
-    limit: int | None = None,
-    *,
-    progress: Progress | None = None,
-    should_stop: StopCheck | None = None,
-) -> dict[str, Any]:
-    """Fit each held-out subject's first visit and predict the others, and the same person elsewhere.
+@dataclass(frozen=True)
+class Transfer:
+    """Fit held-out subjects once and predict them at other visits and other covariates.
 
     A fit is shown at the other covariates themselves, whether its own were given or inferred, with what is
     expected to last of its code; beside it stands the paper's transfer, which keeps the whole code. (To
@@ -98,46 +80,90 @@ def transfer(
     the truth is what the synthetic population makes of the fitted visit's own variation at them. Subjects
     whose first visit is outside the observed ranges are left out.
 
-    Args:
-        atlas: what was trained.
-        store: where its held-out shapes are; None where the population can be made again.
-        limit: at most so many subjects, those with most visits first.
-        progress: told the finished share.
-        should_stop: polled between steps.
-
-    Returns:
-        For each of :data:`QUESTIONS` that can be asked a record with a :func:`~.tables.summary` and the
-        share ``held`` of volumes inside their interval and its median ``width_cm3`` for each of
-        :data:`WAYS`, and ``cases`` with the volumes in cm3; and what the columns mean.
-
-    Raises:
-        InputError: when there is nobody to predict.
-        Cancelled: when ``should_stop()`` turned true.
+    Attributes:
+        atlas: the .safetensors file.
+        store: where its held-out shapes are; not needed for the synthetic populations, which are made
+            again from their seed.
+        limit: at most so many subjects, those with most visits first; 0 takes all.
     """
-    subjects = _subjects(atlas.population)[:limit]
-    shapes = held_out_shapes(atlas, store, subjects=subjects)
-    cases: dict[str, list[Case]] = {question: [] for question in QUESTIONS}
-    for done, subject in enumerate(subjects, start=1):
-        visits = [shape for shape in shapes if shape.subject == subject]
-        truths = {"visits": visits[1:], "counterfactuals": _counterfactuals(atlas, visits[0])}
-        if any(truths.values()):
-            fits = [
-                atlas.fit(visits[0].mesh_mm, known, should_stop=should_stop)
-                for known in (visits[0].values, {})
+
+    atlas: Path
+    _: KW_ONLY
+    store: Path | None = None
+    limit: int = 0
+
+    def cases(self) -> list[HeldOutSubject]:
+        """The held-out subjects of whom there is something to predict.
+
+        Raises:
+            InputError: when there is nobody, or the model carries no shape to other covariates.
+        """
+        atlas = opened(self.atlas)
+        if not atlas.capabilities.transferable:
+            raise InputError(
+                f"{atlas.model_title} does not carry shapes to other covariates, so there is no transfer to "
+                "evaluate; give an atlas of another model"
+            )
+        require_shapes(atlas, self.store, self.limit)
+        chosen = _subjects(atlas.population)[: self.limit or None]
+        asked = [name for name in chosen if len(_rows(atlas, name)) > 1 or _partner(atlas, name)]
+        if not asked:
+            raise InputError(
+                "nobody held out was seen twice, so there is nothing to predict; hold out such subjects"
+            )
+        return [HeldOutSubject(name) for name in asked]
+
+    def measure(self, case: HeldOutSubject, progress: Progress = SILENT) -> Record:
+        """One subject fitted at the first visit and predicted elsewhere, for each of :data:`QUESTIONS`.
+
+        Raises:
+            Cancelled: when nobody waits any more.
+        """
+        atlas = opened(self.atlas)
+        seen, *later = (held_out(atlas, self.store, row) for row in _rows(atlas, case.name))
+        fits = [
+            atlas.fit(seen.mesh_mm, known, progress=piece)
+            for known, piece in progress.part(0.0, 0.5).over([seen.values, {}])
+        ]
+        truths = {"visits": later, "counterfactuals": _counterfactuals(atlas, seen)}
+        return {
+            question: [
+                _predictions(atlas, seen, truth, fits, piece)
+                for truth, piece in progress.part(0.5, 1.0).over(targets)
             ]
-        for question, targets in truths.items():
-            cases[question] += [_case(atlas, visits[0], target, fits, should_stop) for target in targets]
-        if progress is not None:
-            progress(done / len(subjects))
-    asked = {question: found for question, found in cases.items() if found}
-    if not asked:
-        raise InputError(
-            "nobody held out was seen twice, so there is nothing to predict; hold out such subjects"
-        )
-    some = next(
-        way.distances for case in next(iter(asked.values())) for way in case.ways.values() if way.distances
-    )
-    return {**{question: _record(found) for question, found in asked.items()}, **meaning(some)}
+            for question, targets in truths.items()
+        }
+
+    def summarise(self, records: Sequence[Record]) -> Record:
+        """The report.
+
+        Returns:
+            For each of :data:`QUESTIONS` that can be asked a record with a :func:`~.reports.summary` and the
+            share ``held`` of volumes inside their interval and its median ``width_cm3`` for each of
+            :data:`WAYS`, and ``cases`` with the volumes in cm³; and what the columns mean.
+
+        Raises:
+            InputError: when no prediction has a surface.
+        """
+        asked = {name: [one for record in records for one in record[name]] for name in QUESTIONS}
+        everything = [one[way] for found in asked.values() for one in found for way in WAYS]
+        some = next((distances for one in everything for distances in _distances([one])), None)
+        if some is None:
+            raise InputError("no prediction has a surface, so there is nothing to compare; train for longer")
+        return {**{name: _record(found) for name, found in asked.items() if found}, **meaning(some)}
+
+    def markdown(self, report: Mapping[str, Any]) -> str:
+        """The report as tables, also of one that was read back from JSON."""
+        rows = published.TRANSFER.get(opened(self.atlas).name, ()) if "visits" in report else ()
+        sections = []
+        for question, title in QUESTIONS.items():
+            if question in report:
+                beside = rows if question == "visits" else ()
+                sections.append(_question_table(title, report[question], beside))
+        if "visits" in report:
+            sections.append(_patient_table(report["visits"]["cases"]))
+        sections.append(definitions(report, published.TRANSFER_NOTE if rows else ""))
+        return "\n\n".join(sections) + "\n"
 
 
 def _subjects(population: Population) -> list[str]:
@@ -145,114 +171,104 @@ def _subjects(population: Population) -> list[str]:
     rows = np.flatnonzero(population.held_out)
     counts = Counter(population.subjects[row] for row in rows)
     first = {population.subjects[row]: population.row(int(row)) for row in rows[::-1]}
-    inside = [subject for subject in counts if is_inside(population, first[subject])]
+    inside = [subject for subject in counts if population.contains(first[subject])]
     return sorted(inside, key=lambda subject: -counts[subject])
+
+
+def _rows(atlas: Atlas, subject: str) -> list[int]:
+    """The rows of a subject's visits."""
+    return held_out_rows(atlas, subjects=[subject])
 
 
 def _counterfactuals(atlas: Atlas, seen: HeldOut) -> list[HeldOut]:
     """The person of a visit on that day at somebody else's covariates; nobody where that is not known."""
-    module, values = synthetic(atlas), _partner(atlas.population, seen)
-    if module is None or values is None:
+    values = _partner(atlas, seen.subject)
+    if values is None:
         return []
-    return [HeldOut(values, _same_person_mm(atlas, module, seen, values), seen.subject, seen.visit)]
+    return [HeldOut(values, _same_person_mm(atlas, seen, values), seen.subject, seen.visit)]
 
 
-def _partner(population: Population, seen: HeldOut) -> dict[str, float] | None:
-    """Covariates of the next held-out subject, the first following the last, with the same binary ones."""
-    rows = np.flatnonzero(population.held_out)
-    own = [row for row in rows if population.subjects[row] == seen.subject]
-    binary = [c.name for c in population.covariates if c.kind == "binary"]
-    for row in (*rows[rows > max(own)], *rows[rows < min(own)]):
-        values = population.row(int(row))
-        if all(values[name] == seen.values[name] for name in binary):
-            return values
-    return None
+def _partner(atlas: Atlas, subject: str) -> dict[str, float] | None:
+    """Covariates of the next held-out subject, the first following the last, with the same binary ones.
+
+    None where nobody is like that, or nobody knows what the subject looks like at them.
+    """
+    people = atlas.population
+    rows, own = np.flatnonzero(people.held_out), _rows(atlas, subject)
+    first = people.row(own[0])
+    binary = [c.name for c in people.covariates if c.kind == "binary"]
+    others = map(people.row, map(int, (*rows[rows > max(own)], *rows[rows < min(own)])))
+    like = (values for values in others if all(values[name] == first[name] for name in binary))
+    return None if synthetic(atlas) is None else next(like, None)
 
 
-def _same_person_mm(
-    atlas: Atlas, module: PopulationModule, seen: HeldOut, values: Mapping[str, float]
-) -> Any:
-    visit: Any = source_visits(atlas, module)[seen.subject, seen.visit]
-    return aligned(atlas, *module.visit_shape(dataclasses.replace(visit, values=values)))
+def _same_person_mm(atlas: Atlas, seen: HeldOut, values: Mapping[str, float]) -> trimesh.Trimesh:
+    visit: Any = source_visits(atlas)[seen.subject, seen.visit]
+    return aligned(atlas, *known_population(atlas).visit_shape(replace(visit, values=values)))
 
 
-def _case(
-    atlas: Atlas, seen: HeldOut, truth: HeldOut, fits: Sequence[Fit], should_stop: StopCheck | None
-) -> Case:
-    given, inferred = (_predicted(fit.at(truth.values, extrapolate=True), truth, should_stop) for fit in fits)
-    kept, average = (
-        _measured(atlas.shape(truth.values, code, extrapolate=True, should_stop=should_stop), None, truth)
-        for code in (fits[0].latent, None)
-    )
-    return Case(seen, truth, dict(zip(WAYS, (given, inferred, kept, average), strict=True)))
-
-
-def _predicted(person: Individual, truth: HeldOut, should_stop: StopCheck | None) -> Prediction:
-    if should_stop is not None and should_stop():
-        raise Cancelled
-    return _measured(person.surface, person.volume_interval_cm3, truth)
-
-
-def _measured(surface_mm: Any, interval_cm3: tuple[float, float] | None, truth: HeldOut) -> Prediction:
-    distances = compare(truth.mesh_mm, surface_mm) if len(surface_mm.faces) else None
-    return Prediction(distances, float(surface_mm.volume) / 1000, interval_cm3)
-
-
-def _record(cases: Sequence[Case]) -> dict[str, Any]:
+def _predictions(
+    atlas: Atlas, seen: HeldOut, truth: HeldOut, fits: Sequence[Fit], progress: Progress
+) -> Record:
+    """A person seen once, and predicted elsewhere in every way of :data:`WAYS`."""
     ways = {}
-    for way in WAYS:
-        found = [case.ways[way].distances for case in cases]
-        sure = [(_volume_cm3(case.truth), ends) for case in cases if (ends := case.ways[way].interval_cm3)]
-        held = [low <= volume <= high for volume, (low, high) in sure]
-        ways[way] = {
-            **summary([one for one in found if one]),
-            "held": float(np.mean(held)) if held else None,
-            "width_cm3": float(np.median([high - low for _, (low, high) in sure])) if sure else None,
-        }
-    people = len({case.seen.subject for case in cases})
-    return {"n": len(cases), "subjects": people, **ways, "cases": [_case_record(case) for case in cases]}
-
-
-def _volume_cm3(shape: HeldOut) -> float:
-    return float(shape.mesh_mm.volume) / 1000
-
-
-def _case_record(case: Case) -> dict[str, Any]:
+    for way, fit in zip(("given", "inferred"), fits, strict=True):
+        progress.check()
+        person = fit.at(truth.values, extrapolate=True)
+        ways[way] = _measured(person.surface, person.volume_interval_cm3, truth)
+    for way, code in (("kept", fits[0].latent), ("average", None)):
+        surface = atlas.shape(truth.values, code, extrapolate=True, progress=progress.quiet)
+        ways[way] = _measured(surface, None, truth)
     return {
-        "subject": case.seen.subject,
-        "fitted_visit": case.seen.visit,
-        "fitted_values": case.seen.values,
-        "visit": case.truth.visit,
-        "values": case.truth.values,
-        "measured_cm3": _volume_cm3(case.truth),
-        **{
-            way: {"volume_cm3": one.volume_cm3, "interval_cm3": one.interval_cm3 and list(one.interval_cm3)}
-            for way, one in case.ways.items()
-        },
+        "subject": seen.subject,
+        "fitted_visit": seen.visit,
+        "fitted_values": seen.values,
+        "visit": truth.visit,
+        "values": truth.values,
+        "measured_cm3": float(truth.mesh_mm.volume) / 1000,
+        **ways,
     }
 
 
-def transfer_markdown(report: Mapping[str, Any], published: Sequence[Published] = ()) -> str:
-    """The report of :func:`transfer` as tables.
-
-    Args:
-        report: also as read back from JSON.
-        published: rows to show beside the measured ones of other visits.
-    """
-    sections = []
-    for question, title in QUESTIONS.items():
-        if question in report:
-            beside = published if question == "visits" else ()
-            sections.append(_question_table(title, report[question], beside))
-    if "visits" in report:
-        sections.append(_patient_table(report["visits"]["cases"]))
-    sections.append(definitions(report, PUBLISHED_NOTE if published and "visits" in report else ""))
-    return "\n\n".join(sections) + "\n"
+def _measured(
+    surface_mm: trimesh.Trimesh, interval_cm3: tuple[float, float] | None, truth: HeldOut
+) -> Record:
+    """One way to predict a shape: the distances from the truth are missing where nothing was predicted."""
+    distances = compare(truth.mesh_mm, surface_mm) if len(surface_mm.faces) else None
+    return {
+        "volume_cm3": float(surface_mm.volume) / 1000,
+        "interval_cm3": interval_cm3 and list(interval_cm3),
+        "distances": distances and asdict(distances),
+    }
 
 
-def _question_table(title: str, record: Mapping[str, Any], published: Sequence[Published]) -> str:
+def _record(cases: Sequence[Record]) -> Record:
+    ways = {}
+    for way in WAYS:
+        sure = [(case["measured_cm3"], ends) for case in cases if (ends := case[way]["interval_cm3"])]
+        held = [low <= volume <= high for volume, (low, high) in sure]
+        ways[way] = {
+            **summary(_distances([case[way] for case in cases])),
+            "held": float(np.mean(held)) if held else None,
+            "width_cm3": float(np.median([high - low for _, (low, high) in sure])) if sure else None,
+        }
+    people = len({case["subject"] for case in cases})
+    return {"n": len(cases), "subjects": people, **ways, "cases": [_volumes(case) for case in cases]}
+
+
+def _distances(predictions: Sequence[Record]) -> list[Distances]:
+    return [Distances(**one["distances"]) for one in predictions if one["distances"]]
+
+
+def _volumes(case: Record) -> Record:
+    """A case without its distances."""
+    ways = {way: {key: case[way][key] for key in ("volume_cm3", "interval_cm3")} for way in WAYS}
+    return {**case, **ways}
+
+
+def _question_table(title: str, record: Mapping[str, Any], beside: Sequence[Published]) -> str:
     rows = [[label, *distance_cells(record[way]), *_interval(record[way])] for way, label in WAYS.items()]
-    rows += [[f"published: {row.label}", *published_cells(row), "–", "–"] for row in published]
+    rows += [[f"published: {row.label}", *published_cells(row), "–", "–"] for row in beside]
     header = ["", *COLUMNS.values(), "volume inside its 95 % interval", "median width of that, cm³"]
     size = f"{record['n']} shapes of {record['subjects']} held-out subjects, mean / median"
     return f"**{title}: {size}**\n\n{markdown_table(header, rows)}"

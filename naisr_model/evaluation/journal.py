@@ -1,0 +1,103 @@
+"""What an evaluation has measured so far, one line of JSON a case, so that a run that was killed goes on.
+
+The first line says of what the journal is; every other one is a case. A line counts once it is complete, so
+the half of one that a killed run leaves is forgotten, and its case is measured again.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from io import BufferedWriter
+from pathlib import Path
+from typing import Any
+
+from naisr_model.errors import InputError
+
+Record = dict[str, Any]
+"""Plain JSON types by name."""
+
+Keep = Callable[[str, Record], None]
+
+
+def plain(record: Mapping[str, Any]) -> Record:
+    """A record as it comes back from a journal, whether it was in one or not."""
+    return json.loads(json.dumps(record))
+
+
+def read(path: Path, identity: Record) -> dict[str, Record]:
+    """The records that a journal keeps, by key; none where there is no journal yet.
+
+    Args:
+        path: the journal.
+        identity: what it must be of, see :func:`keeping`.
+
+    Raises:
+        InputError: when it is of something else, or no journal.
+    """
+    first, *cases = [_parsed(path, line) for line in _complete_lines(path, identity)] or [identity]
+    if first != identity:
+        raise InputError(f"{path} keeps {_other(first, identity)}; name another journal, or delete this one")
+    return {case["key"]: case["record"] for case in cases}
+
+
+@contextmanager
+def keeping(path: Path, identity: Record) -> Iterator[Keep]:
+    """Hands out what adds a record under a key, after those that :func:`read` gives.
+
+    Args:
+        path: the journal; made where there is none.
+        identity: of what it is: its first line.
+    """
+    whole = _complete_lines(path, identity)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("ab") as file:
+        file.truncate(sum(map(len, whole)))
+        if not whole:
+            _add(file, identity)
+        yield lambda key, record: _add(file, {"key": key, "record": record})
+
+
+def _add(file: BufferedWriter, value: Record) -> None:
+    """Add a line, and wait until it is on the disk."""
+    file.write(_line(value))
+    file.flush()
+    os.fsync(file.fileno())
+
+
+def _line(value: Record) -> bytes:
+    return json.dumps(value).encode() + b"\n"
+
+
+def _complete_lines(path: Path, identity: Record) -> list[bytes]:
+    """The lines of a journal with their ends; none where a run was killed before the first was written."""
+    content = path.read_bytes() if path.exists() else b""
+    lines = content.splitlines(keepends=True)
+    whole = [line for line in lines if line.endswith(b"\n")]
+    if lines and not whole and not _line(identity).startswith(content):
+        raise _no_journal(path)
+    return whole
+
+
+def _parsed(path: Path, line: bytes) -> Record:
+    try:
+        value = json.loads(line)
+    except ValueError as error:
+        raise _no_journal(path) from error
+    if not isinstance(value, dict):
+        raise _no_journal(path)
+    return value
+
+
+def _no_journal(path: Path) -> InputError:
+    return InputError(f"{path} is no journal of an evaluation; name another file")
+
+
+def _other(found: Record, expected: Record) -> str:
+    """What a journal is of, where that is not what was expected."""
+    if found.keys() != expected.keys():
+        return "something else"
+    names = [name for name in expected if found[name] != expected[name]]
+    return f"an evaluation with another {' and another '.join(names)}"

@@ -1,0 +1,117 @@
+"""What an evaluation is: cases that are measured one by one, and a report of all of them.
+
+A study is one file in ``studies`` and one line in its registry: a frozen dataclass, small enough to be sent
+to other processes, whose fields are its options, documented under ``Attributes``. :func:`run` does the rest:
+it keeps what is measured in a journal and spreads the cases over processes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import fields
+from functools import partial
+from pathlib import Path
+from typing import Any, ClassVar, Protocol, TypeVar
+
+from naisr_model import __version__
+from naisr_model.data.store import INDEX
+from naisr_model.evaluation import journal as journals
+from naisr_model.evaluation.journal import Keep, Record, plain
+from naisr_model.progress import SILENT, Progress
+from naisr_model.work.run import processes
+
+
+class Case(Protocol):
+    """One unit of work; it can be pickled."""
+
+    @property
+    def key(self) -> str:
+        """Its name among the cases of its study, the same in every run."""
+
+
+CaseType = TypeVar("CaseType", bound=Case)
+
+
+class Study(Protocol[CaseType]):
+    """What can be asked of an atlas."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    def cases(self) -> Sequence[CaseType]:
+        """Everything that is to be measured, the same in every run.
+
+        Raises:
+            InputError: when an option makes no sense or there is nothing to measure.
+        """
+
+    def measure(self, case: CaseType, progress: Progress = SILENT) -> Record:
+        """What is found out about one case, in plain JSON types; it depends on no other case."""
+
+    def summarise(self, records: Sequence[Record]) -> Record:
+        """The report in plain JSON types, from the records in the order of the cases."""
+
+    def markdown(self, report: Mapping[str, Any]) -> str:
+        """The report as tables, with units and definitions."""
+
+
+def run(
+    study: Study[CaseType],
+    *,
+    workers: int | None = 1,
+    journal: Path | None = None,
+    progress: Progress = SILENT,
+) -> Record:
+    """The report of a study.
+
+    Args:
+        study: what is asked.
+        workers: processes; None for one a core. The report is the same for any number of them. One is the
+            default because a single process already uses all cores within a case, several need their memory
+            each, and cases that measure time have to have the machine for themselves.
+        journal: file that keeps what is measured, so that a run that was stopped or killed goes on there.
+        progress: told the finished share.
+
+    Raises:
+        InputError: when there is nothing to measure, or the journal is of something else.
+        Cancelled: when nobody waits any more.
+    """
+    cases = study.cases()
+    if len({case.key for case in cases}) < len(cases):
+        raise ValueError(f"two cases of {study} have the same key")
+    named = None if journal is None else (journal, identity(study))
+    records = {} if named is None else journals.read(*named)
+    missing = [case for case in cases if case.key not in records]
+    left = progress.part(1 - len(missing) / len(cases), 1.0) if cases else progress
+    # A question whether anybody waits cannot be sent along: elsewhere a case is measured to its end.
+    measure = partial(study.measure, progress=left.quiet) if workers == 1 else study.measure
+    with processes(workers) as work, _keeping(named) as keep:
+        for number, record in work(measure, missing, left):
+            records[missing[number].key] = plain(record)
+            keep(missing[number].key, record)
+    return study.summarise([records[case.key] for case in cases])
+
+
+def identity(study: Study[Any]) -> Record:
+    """What makes two runs the same: the program's version, the study, and its options.
+
+    Files stand for themselves by their contents, so that they may move.
+    """
+    options = {field.name: _contents(getattr(study, field.name)) for field in fields(study)}
+    return plain({"version": __version__, "study": type(study).__name__, **options})
+
+
+def _contents(value: Any) -> Any:
+    """The value of an option; of a file its fingerprint, of a store that of its index."""
+    if not isinstance(value, Path):
+        return value
+    file = value / INDEX if value.is_dir() else value
+    return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
+def _keeping(named: tuple[Path, Record] | None) -> AbstractContextManager[Keep]:
+    return nullcontext(_forget) if named is None else journals.keeping(*named)
+
+
+def _forget(_key: str, _record: Record) -> None: ...
