@@ -12,9 +12,8 @@ import numpy as np
 import torch
 
 from naisr_model.atlas import Atlas
-from naisr_model.config import PRESETS, NetworkConfig
 from naisr_model.errors import InputError
-from naisr_model.models.naisr.network import Naisr
+from naisr_model.models.naisr.network import Naisr, NaisrConfig
 from naisr_model.models.siren import SirenStack
 
 LINEAR = 1e-3
@@ -25,10 +24,12 @@ def paper_sized(atlas: Atlas) -> Atlas:
     """The same atlas with networks of the size of ``paper-airway``.
 
     Raises:
-        InputError: when its networks are larger than that.
+        InputError: when its networks are larger than that, or of another model.
     """
-    checkpoint = atlas.checkpoint
-    network = at_paper_size(checkpoint.network())
+    checkpoint, own = atlas.checkpoint, atlas.checkpoint.model()
+    if not isinstance(own, Naisr):
+        raise InputError(f"the paper's network size is that of {Naisr.title}; give an atlas of it")
+    network = at_paper_size(own)
     padding = network.config.latent - checkpoint.latents.shape[1]
     return Atlas(
         dataclasses.replace(
@@ -49,7 +50,7 @@ def at_paper_size(network: Naisr) -> Naisr:
     Raises:
         InputError: when ``network`` is larger than that.
     """
-    config = dataclasses.replace(PRESETS["paper-airway"].network, dim=network.config.dim)
+    config = NaisrConfig(dim=network.config.dim)
     if not _fits(network.config, config):
         raise InputError("the atlas has larger networks than the paper's; measure a smaller one")
     large = Naisr(config, len(network.displacement_networks.last_bias)).to(network.device)
@@ -58,7 +59,7 @@ def at_paper_size(network: Naisr) -> Naisr:
     return large.eval()
 
 
-def _fits(small: NetworkConfig, large: NetworkConfig) -> bool:
+def _fits(small: NaisrConfig, large: NaisrConfig) -> bool:
     return small.latent <= large.latent and all(
         mine.width <= theirs.width and mine.hidden <= theirs.hidden
         for mine, theirs in ((small.template, large.template), (small.displacement, large.displacement))

@@ -12,7 +12,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from naisr_model.config import LossWeights, NetworkConfig, SirenConfig
+from naisr_model.config import LossWeights, SirenConfig
 from naisr_model.learning.training.objective import Batch
 from naisr_model.models.naisr.network import Naisr
 from naisr_model.models.siren import SirenStack
@@ -47,8 +47,8 @@ class PlainNaisr(nn.Module):
 
     def __init__(self, network: Naisr) -> None:
         super().__init__()
-        config: NetworkConfig = network.config
-        stack, dim = network.displacement_networks, config.dim
+        config, stack = network.config, network.displacement_networks
+        dim = config.dim
         inputs = dim + 1 + config.latent
         self.template = PlainSiren(config.template, dim, 1)
         plains = [PlainSiren(config.displacement, inputs, dim, skipped=dim + 1) for _ in stack.last_bias]
