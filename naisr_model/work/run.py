@@ -17,7 +17,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import partial
 from operator import itemgetter
-from typing import Any, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 from threadpoolctl import threadpool_limits
 
@@ -54,6 +54,9 @@ class Run(Protocol):
 def processes(workers: int | None = None) -> Iterator[Run]:
     """Hands out :class:`Run`, over processes that stay until the end; a killed parent takes them along.
 
+    Where the work ends with an exception they leave at once, whatever they are at: what a job writes has to
+    bear that.
+
     Args:
         workers: how many; None for one a core, 1 to stay in this process.
 
@@ -67,9 +70,15 @@ def processes(workers: int | None = None) -> Iterator[Run]:
         yield _run_here
         return
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(count, mp_context=context, initializer=_start_worker)
+    given_up = context.Event()
+    pool = ProcessPoolExecutor(
+        count, mp_context=context, initializer=_start_worker, initargs=(given_up.wait,)
+    )
     try:
         yield partial(_run_in, pool)
+    except BaseException:
+        given_up.set()
+        raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
 
@@ -115,17 +124,18 @@ def _run_in(
         ) from error
 
 
-def _start_worker() -> None:
+def _start_worker(until_given_up: Callable[[], object]) -> None:
     """One thread a worker, which leaves when its parent says so and not at the Ctrl+C of a terminal."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.environ.update(dict.fromkeys(THREADS, "1"))
     threadpool_limits(1)
     parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=_leave_with, args=(parent,), daemon=True).start()
+    assert parent is not None
+    # A killed parent cannot end its workers, and they would wait for work for ever.
+    for ends in (until_given_up, parent.join):
+        threading.Thread(target=_leave_after, args=(ends,), daemon=True).start()
 
 
-def _leave_with(parent: Any) -> None:
-    """A killed parent cannot end its workers, and they would wait for work for ever."""
-    parent.join()
+def _leave_after(ends: Callable[[], object]) -> None:
+    ends()
     os._exit(1)

@@ -38,6 +38,11 @@ def test_a_worker_has_one_thread():
         assert in_order(work(eval, ["__import__('torch').get_num_threads()"])) == [1]
 
 
+def test_the_ctrl_c_of_a_terminal_is_left_to_the_parent():
+    with processes(2) as work:
+        assert in_order(work(eval, ["__import__('os').kill(__import__('os').getpid(), 2)", "3"])) == [None, 3]
+
+
 def test_a_result_is_there_before_the_other_jobs_are_done():
     with processes(2) as work:
         results = work(time.sleep, [60.0, 0.0])
@@ -63,6 +68,12 @@ def test_nobody_waits_any_more(workers):
         for number, _ in work(abs, range(1000), two_are_enough):
             finished.append(number)
     assert 2 <= len(finished) < 1000
+
+
+def test_what_is_still_at_work_is_given_up():
+    with pytest.raises(Cancelled), processes(2) as work:
+        for _ in work(time.sleep, [0.0, 3600.0]):
+            raise Cancelled
 
 
 def test_a_number_of_workers_that_makes_no_sense():

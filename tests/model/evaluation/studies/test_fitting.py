@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from naisr_model.errors import InputError
@@ -36,5 +38,6 @@ def test_means_are_over_shapes_and_times_in_all(egg_atlas):
 
 @pytest.mark.parametrize("option", ["limit", "steps"])
 def test_nothing_to_fit_is_refused(egg_atlas, option):
+    none: dict[str, Any] = {option: 0}
     with pytest.raises(InputError, match=f"--{option} is 0; give 1 or more"):
-        run(Fitting(egg_atlas, **{option: 0}))
+        run(Fitting(egg_atlas, **none))
