@@ -232,7 +232,7 @@ def _sampling(
 def _remove_strangers(folder: Path, known: set[str]) -> None:
     """Delete samples that the store no longer refers to, and what a killed run left half done.
 
-    Only names that :func:`_job` and :func:`write_samples` make: the user may keep other things here.
+    Only names that :func:`_sampling` and :func:`write_samples` make: the user may keep other things here.
     """
     for path in folder.iterdir():
         if path.name not in known and _OWN_NAME.fullmatch(path.name):

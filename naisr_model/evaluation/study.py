@@ -17,6 +17,7 @@ from typing import Any, ClassVar, Protocol, TypeVar
 
 from naisr_model import __version__
 from naisr_model.data.store import INDEX
+from naisr_model.errors import InputError
 from naisr_model.evaluation import journal as journals
 from naisr_model.evaluation.journal import Keep, Record, plain
 from naisr_model.progress import SILENT, Progress
@@ -78,13 +79,15 @@ def run(
         Cancelled: when nobody waits any more.
     """
     cases = study.cases()
+    if not cases:
+        raise InputError("there is nothing to measure with these options; ask for more")
     if len({case.key for case in cases}) < len(cases):
         raise ValueError(f"two cases of {study} have the same key")
     named = None if journal is None else (journal, identity(study))
     records = {} if named is None else journals.read(*named)
     missing = [case for case in cases if case.key not in records]
-    left = progress.part(1 - len(missing) / len(cases), 1.0) if cases else progress
-    # A question whether anybody waits cannot be sent along: elsewhere a case is measured to its end.
+    left = progress.part(1 - len(missing) / len(cases), 1.0)
+    # Whether anybody waits cannot be asked from other processes: there a case is given up with its process.
     measure = partial(study.measure, progress=left.quiet) if workers == 1 else study.measure
     with processes(workers) as work, _keeping(named) as keep:
         for number, record in work(measure, missing, left):

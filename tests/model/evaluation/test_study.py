@@ -100,6 +100,11 @@ def test_a_journal_is_of_one_study_with_one_atlas_and_its_options(squares, tmp_p
         run(replace(squares, atlas=moved), journal=journal)
 
 
+def test_nothing_to_measure_is_said(squares):
+    with pytest.raises(InputError, match="nothing to measure with these options"):
+        run(replace(squares, numbers=0))
+
+
 def test_two_cases_of_one_key_are_a_mistake(squares):
     class Twice(Squares):
         def cases(self) -> list[Number]:
