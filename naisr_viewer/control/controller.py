@@ -44,8 +44,8 @@ from naisr_viewer.state.requests import (
     missing,
     request_for,
 )
+from naisr_viewer.state.theme import ThemeChoice
 from naisr_viewer.views.main_window import MainWindow
-from naisr_viewer.views.theme import ThemeChoice
 from naisr_viewer.words.captions import caption
 from naisr_viewer.words.numbers import in_words
 from naisr_viewer.words.status import status_line

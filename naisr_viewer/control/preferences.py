@@ -6,7 +6,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QSettings
 
-from naisr_viewer.views.theme import ThemeChoice
+from naisr_viewer.state.theme import ThemeChoice
 
 RECENT_FILES = 8
 

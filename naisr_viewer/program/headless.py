@@ -14,7 +14,7 @@ from naisr_viewer.control.controller import Controller
 from naisr_viewer.files import surfaces
 from naisr_viewer.state.explorer import FULL_SHAPE, Layout, all_panels
 from naisr_viewer.state.requests import EXACT_RESOLUTION, ExportChoice
-from naisr_viewer.views.covariates.panel import CovariateRow
+from naisr_viewer.views.covariates.row import CovariateRow
 from naisr_viewer.views.covariates.slider import SLIDER_STEPS
 from naisr_viewer.views.main_window import MainWindow
 

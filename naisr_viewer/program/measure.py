@@ -34,7 +34,7 @@ from naisr_viewer.control.controller import Controller
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.files.surfaces import write_atomically
 from naisr_viewer.state.explorer import FULL_SHAPE, Panel, panel_values, visible_panels
-from naisr_viewer.views.covariates.panel import CovariateRow
+from naisr_viewer.views.covariates.row import CovariateRow
 from naisr_viewer.views.covariates.slider import slider_value
 from naisr_viewer.views.main_window import MainWindow
 

@@ -36,20 +36,18 @@ from PySide6.QtWidgets import (
 
 from naisr_viewer.state.explorer import OF_A_PATIENT, ExplorerState, Layout, visible_panels
 from naisr_viewer.state.patients import Labels
+from naisr_viewer.state.theme import ThemeChoice
 from naisr_viewer.views.covariates.panel import CovariatePanel
-from naisr_viewer.views.dialogs import (
-    ExportDialog,
-    about,
-    ask_image_path,
-    ask_label,
-    ask_open_path,
-    ask_scan_path,
-)
+from naisr_viewer.views.dialogs.about import about
+from naisr_viewer.views.dialogs.export import ExportDialog
+from naisr_viewer.views.dialogs.files import ask_image_path, ask_open_path, ask_scan_path
+from naisr_viewer.views.dialogs.label import ask_label
 from naisr_viewer.views.empty_page import EmptyPage
 from naisr_viewer.views.patients.panel import PatientPanel
 from naisr_viewer.views.shapes.scale_bar import ScaleBar
 from naisr_viewer.views.shapes.shape_view import DIRECTIONS, ShapeView
-from naisr_viewer.views.theme import ThemeChoice, palette, resolved, style_sheet
+from naisr_viewer.views.style_sheet import style_sheet
+from naisr_viewer.views.theme import palette, resolved
 
 TITLE = "NAISR Atlas Explorer"
 FIRST_SIZE = QSize(1280, 800)

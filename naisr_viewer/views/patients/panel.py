@@ -5,125 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
-from PySide6.QtCore import QEvent, QObject, QSignalBlocker, QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
-from PySide6.QtWidgets import (
-    QFrame,
-    QHBoxLayout,
-    QLabel,
-    QListWidget,
-    QListWidgetItem,
-    QScrollArea,
-    QSizePolicy,
-    QToolButton,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QScrollArea, QVBoxLayout, QWidget
 
 from naisr_model.covariates import Covariate
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.patients import Named, Patient
 from naisr_viewer.views.patients.known import KnownPart, NumberField
+from naisr_viewer.views.patients.list import PatientList
 from naisr_viewer.views.patients.pieces import button, exchange, paragraph
 from naisr_viewer.views.patients.result import ComparePart, result_part
 from naisr_viewer.views.patients.scan import AlignmentPart, ScanPart
-from naisr_viewer.words.numbers import volume
 
 PANEL_WIDTH = 300
-ROWS_IN_SIGHT = 4
-"""How many rows of the list are shown before it scrolls."""
-
-ROW_HEIGHT = 30
-LIST_BORDER = 8
-
 INVITATION = "Open a scan to fit the atlas to it: a mesh, a label volume or a cloud of points."
-AVERAGE = "Population average"
-
-
-class ElidedLabel(QLabel):
-    """One line that is shortened in its middle where it does not fit."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__(text)
-        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        """As much of the text as there is room for."""
-        text = self.fontMetrics().elidedText(self.text(), Qt.TextElideMode.ElideMiddle, self.width())
-        painter = QPainter(self)
-        painter.drawText(self.rect(), Qt.AlignmentFlag.AlignVCenter, text)
-        painter.end()
-
-
-class PatientList(QListWidget):
-    """The population average and the open patients."""
-
-    patient_chosen = Signal(object)  # key, or None for the population average
-    close_requested = Signal(int)  # key
-
-    def __init__(self, parent: QWidget) -> None:
-        super().__init__(parent)
-        self.setObjectName("patientList")
-        self.setAccessibleName("Patients")
-        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.currentItemChanged.connect(lambda _item: self.patient_chosen.emit(self._key()))
-        self._patients: tuple[Patient, ...] = ()
-
-    def show_patients(self, patients: tuple[Patient, ...], shown: int | None) -> None:
-        """Bring the rows up to date and mark the one that is shown."""
-        with QSignalBlocker(self):
-            if patients != self._patients:
-                self._patients = patients
-                self._fill()
-            self.setCurrentRow([None, *(patient.key for patient in patients)].index(shown))
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Delete closes the patient."""
-        key = self._key()
-        if event.key() == Qt.Key.Key_Delete and key is not None:
-            self.close_requested.emit(key)
-        else:
-            super().keyPressEvent(event)
-
-    def _fill(self) -> None:
-        self.clear()
-        self._add(AVERAGE, "", "The atlas without anybody's own shape")
-        for patient in self._patients:
-            found = volume(patient.fit.volume_cm3) if patient.fit else "not fitted"
-            close = self._close_button(patient)
-            self._add(patient.name, found, str(patient.reading.path), patient.key, close)
-        self.setFixedHeight(min(self.count(), ROWS_IN_SIGHT) * ROW_HEIGHT + LIST_BORDER)
-
-    def _add(self, name: str, note: str, tip: str, key: int | None = None, *beside: QWidget) -> None:
-        item = QListWidgetItem(self)
-        item.setData(Qt.ItemDataRole.UserRole, key)
-        item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{name}, {note}".removesuffix(", "))
-        item.setToolTip(tip)
-        item.setSizeHint(QSize(0, ROW_HEIGHT))
-        muted = QLabel(note)
-        muted.setObjectName("muted")
-        row = QWidget()
-        line = QHBoxLayout(row)
-        line.setContentsMargins(9, 0, 4, 0)
-        line.setSpacing(6)
-        line.addWidget(ElidedLabel(name), 1)
-        for widget in (muted, *beside):
-            line.addWidget(widget)
-        self.setItemWidget(item, row)
-
-    def _close_button(self, patient: Patient) -> QToolButton:
-        close = QToolButton()
-        close.setText("×")
-        close.setAutoRaise(True)
-        close.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        close.setToolTip("Close this patient (Delete); the file stays as it is")
-        close.setAccessibleName(f"Close {patient.name}")
-        close.clicked.connect(lambda: self.close_requested.emit(patient.key))
-        return close
-
-    def _key(self) -> int | None:
-        item = self.currentItem()
-        return item.data(Qt.ItemDataRole.UserRole) if item else None
 
 
 class PatientPanel(QFrame):

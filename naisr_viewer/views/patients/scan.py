@@ -9,7 +9,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QCheckBox, QFormLayout, QFrame, QHBoxLayout, QVBoxLayout, QWidget
 
 from naisr_viewer.state.patients import Method, Patient, Reading
-from naisr_viewer.views.dialogs import ask_landmarks_path
+from naisr_viewer.views.dialogs.files import ask_landmarks_path
 from naisr_viewer.views.patients.pieces import ChoiceBox, button, exchange, paragraph, section, warnings
 from naisr_viewer.words.patients import METHODS, breakable, measured, sentence, units
 

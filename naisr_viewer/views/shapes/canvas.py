@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QWidget
 from pyvistaqt import QtInteractor
 
 from naisr_viewer.state.requests import Colouring, SurfaceResult
-from naisr_viewer.views.theme import scale_colours
+from naisr_viewer.views.colours import scale_colours
 
 REST_SAMPLES = 4
 """Multi-sampling at rest; none while something moves, where it costs two thirds of a frame."""

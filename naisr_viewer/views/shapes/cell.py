@@ -10,8 +10,8 @@ from PySide6.QtWidgets import QLabel, QWidget
 
 from naisr_viewer.state.explorer import AtlasCard, Panel, panel_title
 from naisr_viewer.state.requests import HAS_TWO_SIDES, SurfaceResult
+from naisr_viewer.views.colours import panel_colour
 from naisr_viewer.views.shapes.colour_bar import HEIGHT_PX, WIDTH_PX, ColourBar
-from naisr_viewer.views.theme import panel_colour
 from naisr_viewer.words.captions import PANEL_HINTS
 
 TITLE_PX = 36

@@ -6,7 +6,7 @@ from PySide6.QtCore import QLineF, QPointF, QRectF, QSize
 from PySide6.QtGui import QLinearGradient, QPainter, QPaintEvent, QPalette, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from naisr_viewer.views.theme import scale_colours
+from naisr_viewer.views.colours import scale_colours
 
 WIDTH_PX = 300
 HEIGHT_PX = 38

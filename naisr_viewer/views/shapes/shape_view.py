@@ -18,9 +18,10 @@ from PySide6.QtWidgets import QFrame, QLabel, QVBoxLayout, QWidget
 
 from naisr_viewer.state.explorer import FULL_SHAPE, OF_A_PATIENT, AtlasCard, Panel, all_panels
 from naisr_viewer.state.requests import SurfaceResult
+from naisr_viewer.views.colours import ghost_colour, panel_colour
 from naisr_viewer.views.shapes.cell import TITLE_PX, Cell, drawn_height, make_cell, strip_height
 from naisr_viewer.views.shapes.grid import cells, columns_for, separators
-from naisr_viewer.views.theme import LIGHT, Theme, ghost_colour, panel_colour
+from naisr_viewer.views.theme import LIGHT, Theme
 
 if TYPE_CHECKING:
     from naisr_viewer.views.shapes.canvas import Canvas, Viewport

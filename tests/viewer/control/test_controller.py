@@ -23,10 +23,10 @@ from naisr_viewer.state.requests import (
     SurfaceResult,
     request_for,
 )
+from naisr_viewer.state.theme import ThemeChoice
 from naisr_viewer.views.covariates.panel import CovariatePanel
 from naisr_viewer.views.main_window import MainWindow
 from naisr_viewer.views.shapes.shape_view import ShapeView
-from naisr_viewer.views.theme import ThemeChoice
 from naisr_viewer.words.numbers import in_words
 
 AGE_ONLY = Panel("effect", "age")

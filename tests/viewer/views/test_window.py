@@ -17,9 +17,10 @@ from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
 
 from naisr_viewer.state.explorer import FULL_SHAPE, Layout, Panel
 from naisr_viewer.state.requests import EXACT_RESOLUTION, PREVIEW_RESOLUTION
+from naisr_viewer.state.theme import ThemeChoice
 from naisr_viewer.views.covariates.slider import HANDLE_PX, JumpSlider
-from naisr_viewer.views.dialogs import ExportDialog
-from naisr_viewer.views.theme import DARK, ThemeChoice
+from naisr_viewer.views.dialogs.export import ExportDialog
+from naisr_viewer.views.theme import DARK
 
 AGE_ONLY = Panel("effect", "age")
 

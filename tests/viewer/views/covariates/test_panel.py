@@ -16,8 +16,10 @@ from pytestqt.qtbot import QtBot
 from naisr_model.covariates import Covariate
 from naisr_viewer.state.explorer import AtlasCard, ExplorerState, opened, with_patient, with_value
 from naisr_viewer.state.patients import Fitted, Patient, Reading, Scan
+from naisr_viewer.views.colours import covariate_colour
 from naisr_viewer.views.covariates import panel as cp
 from naisr_viewer.views.covariates.histogram import BAND_PX, Histogram, bin_counts
+from naisr_viewer.views.covariates.row import SETTLE_MS
 from naisr_viewer.views.covariates.slider import (
     HANDLE_PX,
     SLIDER_STEPS,
@@ -25,7 +27,7 @@ from naisr_viewer.views.covariates.slider import (
     slider_position,
     slider_value,
 )
-from naisr_viewer.views.theme import DARK, LIGHT, covariate_colour, palette
+from naisr_viewer.views.theme import DARK, LIGHT, palette
 from naisr_viewer.words.numbers import decimals
 
 
@@ -96,7 +98,7 @@ def test_a_drag_moves_on_the_way_and_settles_on_release(panel, heard):
     kind, name, value = heard[-1]
     assert (kind, name) == ("settled", "age")
     assert value == pytest.approx(1 + 0.8 * 219, abs=2)
-    QTest.qWait(2 * cp.SETTLE_MS)
+    QTest.qWait(2 * SETTLE_MS)
     assert heard[-1] == (kind, name, value)
 
 

@@ -16,9 +16,10 @@ from naisr_model.data import meshes, volumes
 from naisr_model.data.patients import POINT_ENDINGS
 from naisr_viewer.state.explorer import ExplorerState, opened, showing, with_patient, without_patient
 from naisr_viewer.state.patients import Fitted, Labels, Patient, Reading, Scan
-from naisr_viewer.views import dialogs
+from naisr_viewer.views.dialogs import files, label
 from naisr_viewer.views.patients import panel as pp
 from naisr_viewer.views.patients.known import NumberField
+from naisr_viewer.views.patients.list import AVERAGE
 from naisr_viewer.views.patients.pieces import ChoiceBox
 from naisr_viewer.words.numbers import gained, volume
 from naisr_viewer.words.patients import UNITS, breakable, interval, sentence
@@ -164,7 +165,7 @@ def test_without_an_atlas_nothing_can_be_opened(panel):
 def test_the_list_names_everybody_and_chooses(panel, start, heard):
     state = with_patient(with_patient(start, replace(ONE, fit=FIT)), TWO)
     panel.show_state(state)
-    for word in (pp.AVERAGE, "p01.stl", "48.3 cm³", "p02.ply", "not fitted"):
+    for word in (AVERAGE, "p01.stl", "48.3 cm³", "p02.ply", "not fitted"):
         assert word in words(panel.list).split("\n")
     assert panel.list.currentRow() == 2
     assert heard == []
@@ -484,7 +485,7 @@ def test_nothing_is_cut_off_on_the_right(panel, start):
 
 def test_every_ending_that_the_model_reads_can_be_chosen(panel, monkeypatch):
     readable = meshes.READERS | POINT_ENDINGS | set(volumes.ENDINGS)
-    assert {f".{ending}" for ending in dialogs.SCAN_ENDINGS} == readable
+    assert {f".{ending}" for ending in files.SCAN_ENDINGS} == readable
     offered: list[str] = []
 
     def answer(_parent: QWidget, _title: str, _folder: str, filters: str) -> tuple[str, str]:
@@ -492,7 +493,7 @@ def test_every_ending_that_the_model_reads_can_be_chosen(panel, monkeypatch):
         return "/scans/p01.stl", filters
 
     monkeypatch.setattr(QFileDialog, "getOpenFileName", answer)
-    assert dialogs.ask_scan_path(panel) == Path("/scans/p01.stl")
+    assert files.ask_scan_path(panel) == Path("/scans/p01.stl")
     assert all(f"*{ending}" in offered[0] for ending in readable)
 
 
@@ -501,12 +502,12 @@ def test_a_label_is_chosen_by_its_title(panel):
 
     def answer(key: Qt.Key) -> None:
         dialog = QApplication.activeModalWidget()
-        assert isinstance(dialog, dialogs.LabelDialog)
+        assert isinstance(dialog, label.LabelDialog)
         assert "p01.nii.gz holds 2 labels" in words(dialog)
         QTest.keyClick(dialog.choice, Qt.Key.Key_Down)
         QTest.keyClick(dialog, key)
 
     QTimer.singleShot(0, lambda: answer(Qt.Key.Key_Return))
-    assert dialogs.ask_label(panel, labels) == 4
+    assert label.ask_label(panel, labels) == 4
     QTimer.singleShot(0, lambda: answer(Qt.Key.Key_Escape))
-    assert dialogs.ask_label(panel, labels) is None
+    assert label.ask_label(panel, labels) is None

@@ -7,9 +7,10 @@ import pytest
 from PySide6.QtGui import QColor
 from pytestqt.qtbot import QtBot
 
+from naisr_viewer.views.colours import scale_colours
 from naisr_viewer.views.shapes import colour_bar as cb
 from naisr_viewer.views.shapes.canvas import look_up_table
-from naisr_viewer.views.theme import DARK, LIGHT, palette, scale_colours
+from naisr_viewer.views.theme import DARK, LIGHT, palette
 
 
 def rgb(colour: str) -> np.ndarray:

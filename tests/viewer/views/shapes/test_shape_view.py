@@ -31,12 +31,13 @@ from naisr_viewer.state.explorer import (
     with_value,
 )
 from naisr_viewer.state.requests import Colouring, SurfaceRequest, SurfaceResult
+from naisr_viewer.views.colours import SCAN_COLOUR, SHAPE_COLOUR, scale_colours
 from naisr_viewer.views.shapes import canvas as cv
 from naisr_viewer.views.shapes import shape_view as sv
 from naisr_viewer.views.shapes.cell import CAPTION_PX
 from naisr_viewer.views.shapes.grid import cells, columns_for
 from naisr_viewer.views.shapes.scale_bar import round_length_mm
-from naisr_viewer.views.theme import DARK, LIGHT, SCAN_COLOUR, SHAPE_COLOUR, scale_colours
+from naisr_viewer.views.theme import DARK, LIGHT
 
 
 def test_cells_cover_the_canvas_without_overlap():

@@ -1,0 +1,164 @@
+"""One covariate: slider, number, reset and histogram."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QSignalBlocker, QTimer, Signal
+from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QLabel, QToolButton, QVBoxLayout, QWidget
+
+from naisr_model.covariates import Covariate
+from naisr_viewer.state.explorer import label
+from naisr_viewer.views.covariates.histogram import Histogram
+from naisr_viewer.views.covariates.slider import JumpSlider, slider_position, slider_value
+from naisr_viewer.views.theme import Theme
+from naisr_viewer.views.value_inputs import LevelButton, ValueBox, level_buttons
+from naisr_viewer.words.numbers import mean_reading, reading
+
+SETTLE_MS = 400
+"""Keys and wheel count as one movement until they pause this long."""
+
+
+class CovariateRow(QWidget):
+    """One covariate. Shows what it is told; says what the user does."""
+
+    value_moved = Signal(str, float)  # name, real value: on the way, more will follow
+    value_settled = Signal(str, float)  # name, real value: the user let go or paused
+    reset_requested = Signal(str)  # name: the reset button was pressed
+
+    def __init__(
+        self, covariate: Covariate, observed: NDArray[np.float64], colour: str, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self.covariate = covariate
+        self._colour = colour
+        self.slider = JumpSlider(self)
+        self.slider.setAccessibleName(label(covariate.name))
+        self.histogram = Histogram(covariate, observed, self)
+        self.reset = _reset_button(covariate, self)
+        self.spin = ValueBox(covariate, self) if covariate.kind == "continuous" else None
+        self.buttons = level_buttons(covariate, self) if covariate.kind == "binary" else []
+        self.reading = QLabel(self)
+        self.reading.setObjectName("muted")
+        self.set_home(covariate.centre, is_patient=False)
+        self._pending: float | None = None
+        self._settle = QTimer(self, singleShot=True, interval=SETTLE_MS)
+        self._compose()
+        self._connect()
+
+    @property
+    def reach(self) -> str:
+        """The range in words: ``1 to 233 months``, ``F to M``."""
+        low, high = map(self.covariate.format, self.covariate.range)
+        return f"{low.removesuffix(self.covariate.unit).strip()} to {high}"
+
+    def set_home(self, value: float, is_patient: bool, interval: tuple[float, float] | None = None) -> None:
+        """Say where the row is reset to.
+
+        Args:
+            value: real value.
+            is_patient: whether it is a patient's, and is marked; else the population mean.
+            interval: of a patient's value that was inferred: low and high end (95 %).
+        """
+        self._home = value
+        self.histogram.show_patient(value if is_patient else None, interval)
+        whose = f"patient ({reading(self.covariate, value)})"
+        mean = f"population mean ({mean_reading(self.covariate)})"
+        self.reset.setToolTip(f"Back to the {whose if is_patient else mean}")
+
+    def set_value(self, value: float) -> None:
+        """Show a real value without telling anybody."""
+        with QSignalBlocker(self.slider):
+            self.slider.setValue(slider_position(self.covariate, value))
+        if self.spin is not None:
+            with QSignalBlocker(self.spin):
+                self.spin.setValue(value)
+        for button in self.buttons:
+            button.setChecked(button.level == value)
+        self.reset.setEnabled(value != self._home)
+        self.reading.setText(self.covariate.format(round(value, 2)))
+
+    def forget_move(self) -> None:
+        """Say no more of a movement that has not come to rest."""
+        self._settle.stop()
+        self._pending = None
+        self.slider.setSliderDown(False)
+
+    def set_colours(self, theme: Theme) -> None:
+        """Follow the theme."""
+        self.slider.set_colours(theme, self._colour)
+        self.histogram.set_colours(theme, self._colour)
+
+    def _compose(self) -> None:
+        stripe = QFrame(self)
+        stripe.setFixedWidth(4)
+        stripe.setStyleSheet(f"background: {self._colour}; border-radius: 2px;")
+        name = QLabel(label(self.covariate.name), self)
+        name.setObjectName("covariate")
+        unit = QLabel(self.covariate.unit, self)
+        unit.setObjectName("muted")
+        head = QHBoxLayout()
+        head.setSpacing(6)
+        head.addWidget(name)
+        head.addStretch(1)
+        for widget in (self.reading, self.spin, unit, self.reset):
+            if widget is not None:
+                head.addWidget(widget)
+        self.reading.setVisible(self.spin is None)
+        unit.setVisible(bool(self.covariate.unit))
+        track = QGridLayout()
+        track.setHorizontalSpacing(4)
+        track.setVerticalSpacing(2)
+        track.setColumnStretch(1, 1)
+        track.addWidget(self.slider, 0, 1)
+        track.addWidget(self.histogram, 1, 1)
+        for column, button in zip((0, 2), self.buttons, strict=False):
+            track.addWidget(button, 0, column)
+        body = QVBoxLayout()
+        body.setSpacing(2)
+        body.addLayout(head)
+        body.addLayout(track)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(10)
+        row.addWidget(stripe)
+        row.addLayout(body, 1)
+
+    def _connect(self) -> None:
+        self.slider.valueChanged.connect(self._slider_changed)
+        self.slider.sliderReleased.connect(self._settled)
+        self._settle.timeout.connect(self._settled)
+        self.reset.clicked.connect(lambda: self.reset_requested.emit(self.covariate.name))
+        if self.spin is not None:
+            self.spin.valueChanged.connect(self._moved)
+        for button in self.buttons:
+            button.clicked.connect(self._level_chosen)
+
+    def _slider_changed(self, position: int) -> None:
+        self._moved(slider_value(self.covariate, position))
+        if self.slider.isSliderDown():
+            self._settle.stop()
+
+    def _moved(self, value: float) -> None:
+        self._pending = value
+        self.value_moved.emit(self.covariate.name, value)
+        self._settle.start()
+
+    def _settled(self) -> None:
+        self._settle.stop()
+        if self._pending is not None:
+            value, self._pending = self._pending, None
+            self.value_settled.emit(self.covariate.name, value)
+
+    def _level_chosen(self) -> None:
+        button = self.sender()
+        assert isinstance(button, LevelButton)
+        self.value_settled.emit(self.covariate.name, button.level)
+
+
+def _reset_button(covariate: Covariate, parent: QWidget) -> QToolButton:
+    button = QToolButton(parent)
+    button.setText("↺")
+    button.setAutoRaise(True)
+    button.setAccessibleName(f"Reset {label(covariate.name)}")
+    return button

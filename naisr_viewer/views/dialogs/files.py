@@ -1,0 +1,41 @@
+"""Which file to open, and where a picture goes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtWidgets import QFileDialog, QWidget
+
+from naisr_viewer.state.explorer import ExplorerState
+
+ATLAS_FILTER = "Atlas (*.safetensors);;All files (*)"
+SCAN_ENDINGS = ("stl", "ply", "obj", "vtk", "vtp", "glb", "nii", "nii.gz", "nrrd", "csv", "txt", "xyz")
+"""Meshes, label volumes and text files of points that can be opened as a scan."""
+
+
+def ask_open_path(parent: QWidget) -> Path | None:
+    """The atlas to open, or None."""
+    name, _ = QFileDialog.getOpenFileName(parent, "Open an atlas", "", ATLAS_FILTER)
+    return Path(name) if name else None
+
+
+def ask_scan_path(parent: QWidget) -> Path | None:
+    """The scan to open, or None."""
+    endings = " ".join(f"*.{ending}" for ending in SCAN_ENDINGS)
+    filters = f"Meshes, label volumes and points ({endings});;All files (*)"
+    name, _ = QFileDialog.getOpenFileName(parent, "Open a scan", "", filters)
+    return Path(name) if name else None
+
+
+def ask_landmarks_path(parent: QWidget) -> Path | None:
+    """The landmarks of a scan, a CSV name,x,y,z in its own coordinates, or None."""
+    filters = "Landmarks: name,x,y,z (*.csv);;All files (*)"
+    name, _ = QFileDialog.getOpenFileName(parent, "Landmarks of the scan", "", filters)
+    return Path(name) if name else None
+
+
+def ask_image_path(parent: QWidget, state: ExplorerState) -> Path | None:
+    """Where a picture goes, or None."""
+    proposal = f"{state.atlas.name if state.atlas else 'atlas'}.png"
+    name, _ = QFileDialog.getSaveFileName(parent, "Save a picture", proposal, "PNG (*.png)")
+    return Path(name).with_suffix(".png") if name else None

@@ -1,0 +1,38 @@
+"""Which label of a volume is the shape."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QComboBox, QDialog, QLabel, QWidget
+
+from naisr_viewer.state.patients import Labels
+from naisr_viewer.views.dialogs.pieces import buttons_of, column_in
+
+
+class LabelDialog(QDialog):
+    """Which label of a volume is the shape."""
+
+    def __init__(self, labels: Labels, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Choose a label")
+        self.setMinimumWidth(380)
+        question = QLabel(
+            f"{labels.reading.path.name} holds {len(labels.titles)} labels. Which is the shape?"
+        )
+        question.setTextFormat(Qt.TextFormat.PlainText)
+        question.setWordWrap(True)
+        self.choice = QComboBox(self)
+        self.choice.setAccessibleName("Label")
+        for number, title in labels.titles:
+            self.choice.addItem(title, number)
+        column = column_in(self)
+        for widget in (question, self.choice, buttons_of(self, "Open")):
+            column.addWidget(widget)
+
+
+def ask_label(parent: QWidget, labels: Labels) -> int | None:
+    """Which label of a volume is the shape, or None when the question was cancelled."""
+    dialog = LabelDialog(labels, parent)
+    accepted = dialog.exec() == QDialog.DialogCode.Accepted
+    dialog.deleteLater()
+    return int(dialog.choice.currentData()) if accepted else None

@@ -1,0 +1,23 @@
+"""What the dialogs are put together from."""
+
+from __future__ import annotations
+
+from PySide6.QtWidgets import QDialog, QDialogButtonBox, QVBoxLayout
+
+
+def column_in(dialog: QDialog) -> QVBoxLayout:
+    """The column of a dialog, with room around it."""
+    column = QVBoxLayout(dialog)
+    column.setContentsMargins(18, 18, 18, 14)
+    column.setSpacing(14)
+    return column
+
+
+def buttons_of(dialog: QDialog, accept: str) -> QDialogButtonBox:
+    """Cancel, and what the Enter key does."""
+    buttons = QDialogButtonBox(dialog)
+    buttons.addButton("Cancel", QDialogButtonBox.ButtonRole.RejectRole)
+    buttons.addButton(accept, QDialogButtonBox.ButtonRole.AcceptRole).setDefault(True)
+    buttons.accepted.connect(dialog.accept)
+    buttons.rejected.connect(dialog.reject)
+    return buttons
