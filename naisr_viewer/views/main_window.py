@@ -44,8 +44,9 @@ from naisr_viewer.views.dialogs.files import ask_image_path, ask_open_path, ask_
 from naisr_viewer.views.dialogs.label import ask_label
 from naisr_viewer.views.empty_page import EmptyPage
 from naisr_viewer.views.patients.panel import PatientPanel
+from naisr_viewer.views.shapes.camera import DIRECTIONS
 from naisr_viewer.views.shapes.scale_bar import ScaleBar
-from naisr_viewer.views.shapes.shape_view import DIRECTIONS, ShapeView
+from naisr_viewer.views.shapes.shape_view import ShapeView
 from naisr_viewer.views.style_sheet import style_sheet
 from naisr_viewer.views.theme import palette, resolved
 

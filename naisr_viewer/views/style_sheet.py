@@ -85,7 +85,7 @@ def style_sheet(theme: Theme) -> str:
     #covariate {{ font-weight: 600; }}
     #muted {{ color: {t.muted}; }}
     #panelTitle {{ font-weight: 600; color: {t.text}; background: {t.canvas}; padding-left: 10px; }}
-    #volume {{ color: {t.text}; background: {t.canvas}; }}
+    #caption {{ color: {t.text}; background: {t.canvas}; }}
     #status {{ padding-left: 12px; }}
     #separator {{ background: {t.line}; }}
     #canvasArea {{ background: {t.canvas}; }}

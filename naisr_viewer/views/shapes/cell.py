@@ -11,22 +11,14 @@ from PySide6.QtWidgets import QLabel, QWidget
 from naisr_viewer.state.explorer import AtlasCard, Panel, panel_title
 from naisr_viewer.state.requests import HAS_TWO_SIDES, SurfaceResult
 from naisr_viewer.views.colours import panel_colour
+from naisr_viewer.views.shapes.arrangement import CAPTION_PX, TITLE_PX
 from naisr_viewer.views.shapes.colour_bar import HEIGHT_PX, WIDTH_PX, ColourBar
 from naisr_viewer.words.captions import PANEL_HINTS
-
-TITLE_PX = 36
-CAPTION_PX = 52
-"""Strips above and beneath each shape, kept free for words."""
 
 
 def strip_height(panels: Sequence[Panel]) -> int:
     """Pixels beneath every shape for colour bars; none where no panel has one."""
     return HEIGHT_PX if any(panel.kind in HAS_TWO_SIDES for panel in panels) else 0
-
-
-def drawn_height(area: QRect, strip: int) -> int:
-    """Pixels left for the shape between the title and what stands beneath it."""
-    return max(area.height() - TITLE_PX - CAPTION_PX - strip, 1)
 
 
 @dataclass(eq=False)
@@ -35,13 +27,13 @@ class Cell:
 
     Attributes:
         title: the label above.
-        volume: the label beneath.
+        caption: the label beneath.
         bar: what its colours stand for; None where it has none.
         result: the surface, or None as long as there is none.
     """
 
     title: QLabel
-    volume: QLabel
+    caption: QLabel
     bar: ColourBar | None
     result: SurfaceResult | None = None
 
@@ -53,15 +45,15 @@ class Cell:
     @property
     def widgets(self) -> list[QWidget]:
         """All that stands around the shape."""
-        return [self.title, self.volume, *([] if self.bar is None else [self.bar])]
+        return [self.title, self.caption, *([] if self.bar is None else [self.bar])]
 
     def place(self, area: QRect, strip: int) -> None:
         """The title above the shape; beneath it the colour bar, and the caption under that."""
         self.title.setGeometry(area.left(), area.top(), area.width(), TITLE_PX)
         height = CAPTION_PX + strip
         top = area.top() + area.height() - height
-        self.volume.setGeometry(area.left(), top, area.width(), height)
-        self.volume.setContentsMargins(0, strip, 0, 0)
+        self.caption.setGeometry(area.left(), top, area.width(), height)
+        self.caption.setContentsMargins(0, strip, 0, 0)
         if self.bar is not None:
             width = min(WIDTH_PX, area.width())
             self.bar.setGeometry(area.left() + (area.width() - width) // 2, top, width, HEIGHT_PX)
@@ -74,10 +66,10 @@ def make_cell(panel: Panel, atlas: AtlasCard, parent: QWidget) -> Cell:
     title.setObjectName("panelTitle")
     title.setToolTip(PANEL_HINTS[panel.kind])
     title.setWhatsThis(PANEL_HINTS[panel.kind])
-    volume = QLabel(parent)
-    volume.setObjectName("volume")
-    volume.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
+    caption = QLabel(parent)
+    caption.setObjectName("caption")
+    caption.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
     bar = ColourBar(HAS_TWO_SIDES[panel.kind], parent) if panel.kind in HAS_TWO_SIDES else None
     if bar is not None:
         bar.setToolTip(PANEL_HINTS[panel.kind])
-    return Cell(title, volume, bar)
+    return Cell(title, caption, bar)

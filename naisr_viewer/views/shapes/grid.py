@@ -1,38 +1,73 @@
-"""How sub-plots share the canvas: pure geometry."""
+"""All that stands around the shapes: the cells of an atlas and the lines between them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from PySide6.QtCore import QRect
+from PySide6.QtWidgets import QFrame, QWidget
+
+from naisr_viewer.state.explorer import AtlasCard, Panel
+from naisr_viewer.views.shapes.arrangement import separators
+from naisr_viewer.views.shapes.cell import Cell, make_cell
 
 
-def columns_for(count: int, canvas_aspect: float, shape_aspect: float) -> int:
-    """Columns of a grid of ``count`` panels in which a shape is drawn largest.
+class Grid:
+    """One cell per panel of an atlas, and lines between those that are on screen.
 
     Args:
-        count: how many panels.
-        canvas_aspect: width over height of the whole canvas.
-        shape_aspect: width over height of a shape as seen.
+        parent: the widget they stand on.
+
+    Attributes:
+        cells: by panel, in the order of the canvas's sub-plots.
     """
 
-    def drawn_height(columns: int) -> float:
-        rows = -(-count // columns)
-        return min(1 / rows, canvas_aspect / columns / shape_aspect)
+    def __init__(self, parent: QWidget) -> None:
+        self._parent = parent
+        self._lines: list[QFrame] = []
+        self.cells: dict[Panel, Cell] = {}
 
-    return max(range(1, count + 1), key=lambda columns: (round(drawn_height(columns), 6), -columns))
+    def fill(self, panels: Sequence[Panel], atlas: AtlasCard) -> None:
+        """Make the cells of ``atlas``, still without places."""
+        self.clear()
+        self.cells = {panel: make_cell(panel, atlas, self._parent) for panel in panels}
 
+    def clear(self) -> None:
+        """Take everything away."""
+        for cell in self.cells.values():
+            for widget in cell.widgets:
+                widget.deleteLater()
+        for line in self._lines:
+            line.deleteLater()
+        self.cells, self._lines = {}, []
 
-def cells(count: int, columns: int) -> list[tuple[float, float, float, float]]:
-    """Left, top, width and height of each panel as shares of the canvas; the last fills its row."""
-    rows = -(-count // columns)
-    width, height = 1 / columns, 1 / rows
-    places = [((i % columns) * width, (i // columns) * height, width, height) for i in range(count)]
-    left, top, _, _ = places[-1]
-    return [*places[:-1], (left, top, 1 - left, height)]
+    def index(self, panel: Panel) -> int:
+        """Which of the canvas's sub-plots a panel has."""
+        return list(self.cells).index(panel)
 
+    def place(self, areas: Mapping[Panel, QRect], strip: int) -> None:
+        """Show the cells that have an area and hide the others.
 
-def separators(areas: Sequence[QRect]) -> set[tuple[int, int, int, int]]:
-    """Left, top, width and height of the lines between sub-plots."""
-    beside = {(area.left(), area.top(), 1, area.height()) for area in areas if area.left() > 0}
-    return beside | {(area.left(), area.top(), area.width(), 1) for area in areas if area.top() > 0}
+        Args:
+            areas: where the panels on screen are (px), words included.
+            strip: pixels beneath every shape for colour bars.
+        """
+        for panel, cell in self.cells.items():
+            if panel in areas:
+                cell.place(areas[panel], strip)
+            for widget in cell.widgets:
+                widget.setVisible(panel in areas)
+                widget.raise_()
+        self._place_lines(list(areas.values()))
+
+    def _place_lines(self, areas: Sequence[QRect]) -> None:
+        for line in self._lines:
+            line.hide()  # deleted later; it would be seen until then
+            line.deleteLater()
+        self._lines = []
+        for edge in separators(areas):
+            line = QFrame(self._parent)
+            line.setObjectName("separator")
+            line.setGeometry(*edge)
+            line.show()
+            self._lines.append(line)

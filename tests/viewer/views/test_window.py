@@ -136,8 +136,8 @@ def test_the_scale_bar_follows_the_zoom(ready, qtbot):
     window, _ = ready
     QTest.qWait(30)
     before = window.scale.pixels_per_mm
-    window.shapes._canvas.camera.parallel_scale /= 2
-    window.shapes._canvas.refresh()
+    window.shapes.canvas.camera.parallel_scale /= 2
+    window.shapes.canvas.refresh()
     qtbot.waitUntil(lambda: window.scale.pixels_per_mm == pytest.approx(2 * before), timeout=2000)
 
 
@@ -243,7 +243,7 @@ def test_the_theme_reaches_everything(ready, qtbot):
     image = window.grab_image()
     for place in (QPoint(5, 560), QPoint(800, 75), QPoint(900, 110)):
         assert image.pixelColor(place).lightness() < 90
-    assert window.shapes._canvas.renderers[0].background_color.hex_rgb == DARK.canvas
+    assert window.shapes.canvas.renderers[0].background_color.hex_rgb == DARK.canvas
     controller.set_theme(ThemeChoice.LIGHT)
 
 
@@ -258,7 +258,7 @@ def test_windows_open_and_close_without_leaving_anything(open_window, qtbot, atl
             for _window, controller in pair:
                 controller.open(atlas_file)
             qtbot.waitUntil(lambda pair=pair: all(c.shown for _, c in pair), timeout=10_000)
-            canvases = [window.shapes._canvas for window, _ in pair]
+            canvases = [window.shapes.canvas for window, _ in pair]
             for window, _ in pair:  # in the middle of the exact surfaces
                 window.close()
             assert threading.active_count() == threads

@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import pyvista as pv
 import trimesh
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QColor, QImage
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLabel, QWidget
 from pytestqt.qtbot import QtBot
 
 from naisr_viewer.state.explorer import (
@@ -34,69 +34,45 @@ from naisr_viewer.state.requests import Colouring, SurfaceRequest, SurfaceResult
 from naisr_viewer.views.colours import SCAN_COLOUR, SHAPE_COLOUR, scale_colours
 from naisr_viewer.views.shapes import canvas as cv
 from naisr_viewer.views.shapes import shape_view as sv
-from naisr_viewer.views.shapes.cell import CAPTION_PX
-from naisr_viewer.views.shapes.grid import cells, columns_for
-from naisr_viewer.views.shapes.scale_bar import round_length_mm
+from naisr_viewer.views.shapes.arrangement import CAPTION_PX
+from naisr_viewer.views.shapes.colour_bar import ColourBar
+from naisr_viewer.views.shapes.drawing import DRAWING
 from naisr_viewer.views.theme import DARK, LIGHT
 
-
-def test_cells_cover_the_canvas_without_overlap():
-    for count in range(1, 9):
-        for columns in range(1, count + 1):
-            boxes = cells(count, columns)
-            assert len(boxes) == count
-            assert sum(width * height for _, _, width, height in boxes) == pytest.approx(1)
+Surfaces = dict[Panel, SurfaceResult]
 
 
-def test_tall_shapes_stand_in_a_row_and_flat_ones_are_stacked():
-    assert columns_for(5, canvas_aspect=2.0, shape_aspect=0.3) == 5
-    assert columns_for(5, canvas_aspect=0.5, shape_aspect=4.0) == 1
-    assert columns_for(5, canvas_aspect=1.4, shape_aspect=0.9) == 3
-    assert columns_for(1, canvas_aspect=1.4, shape_aspect=0.9) == 1
-
-
-@pytest.mark.parametrize(("pixels_per_mm", "length_mm"), [(1.0, 50), (0.9, 100), (4.0, 20), (100.0, 0.5)])
-def test_scale_bars_have_round_lengths(pixels_per_mm, length_mm):
-    assert round_length_mm(pixels_per_mm) == pytest.approx(length_mm)
-
-
-def test_a_box_is_seen_at_its_true_size():
-    camera = pv.Camera()
-    camera.focal_point, camera.position, camera.up = (0, 0, 0), (0, -1, 0), (0, 0, 1)
-    box = np.array([[-1.0, 1.0], [-2.0, 2.0], [0.0, 6.0]])
-    cv.aim(camera, box)
-    assert cv.seen_size(camera, box) == pytest.approx((2.0, 6.0))
-    np.testing.assert_allclose(camera.focal_point, [0, 0, 3])
-
-
-def test_closed_surfaces_are_told_from_open_ones():
-    faces = trimesh.creation.icosphere(subdivisions=1).faces
-    assert cv.is_closed(faces)
-    assert not cv.is_closed(faces[:-1])
-    assert not cv.is_closed(np.vstack([faces[:-1], faces[-1][::-1]]))
-    assert not cv.is_closed(faces[:0])
+def computed(engine, card: AtlasCard, **values: float) -> Surfaces:
+    """The surfaces of an atlas at the mean, but for these values."""
+    state = opened(ExplorerState(), card)
+    for name, value in values.items():
+        state = with_value(state, name, value)
+    requests = [SurfaceRequest(card.path, p, panel_values(state, p), 40) for p in all_panels(card)]
+    return {request.panel: engine.surface(request) for request in requests}
 
 
 @pytest.fixture
-def view(qtbot: QtBot, engine, card: AtlasCard) -> Iterator[sv.ShapeView]:
+def surfaces(engine, card: AtlasCard) -> Surfaces:
+    return computed(engine, card)
+
+
+@pytest.fixture
+def view(qtbot: QtBot, card: AtlasCard, surfaces: Surfaces) -> Iterator[sv.ShapeView]:
     view = sv.ShapeView()
     view.resize(900, 600)
     view.show_atlas(card, LIGHT)
     view.show_panels(all_panels(card))
     view.show()
     qtbot.waitExposed(view)
-    show(view, engine, card)
+    show(view, surfaces)
     yield view
     view.clear()
     view.deleteLater()
 
 
-def show(view: sv.ShapeView, engine, card: AtlasCard, **values: float) -> None:
-    state = opened(ExplorerState(), card)
-    for name, value in values.items():
-        state = with_value(state, name, value)
-    for panel in all_panels(card):
-        view.show_surface(engine.surface(SurfaceRequest(card.path, panel, panel_values(state, panel), 40)))
+def show(view: sv.ShapeView, surfaces: Surfaces) -> None:
+    for result in surfaces.values():
+        view.show_surface(result)
     QTest.qWait(30)
 
 
@@ -128,41 +104,82 @@ def moved(result, offset_mm: float):
 
 def pixels(view: sv.ShapeView) -> np.ndarray:
     """The canvas without labels, red, green and blue, ``[height, width, 3]``."""
-    assert view._canvas is not None
-    image = view._canvas.grabFramebuffer().convertToFormat(QImage.Format.Format_RGB32)
+    assert view.canvas is not None
+    image = view.canvas.grabFramebuffer().convertToFormat(QImage.Format.Format_RGB32)
     flat = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), image.bytesPerLine() // 4, 4)
     return flat[:, : image.width(), 2::-1].copy()
 
 
+def beneath(view: sv.ShapeView, panel: Panel, kind: type[QWidget], name: str = "") -> QWidget | None:
+    """What of this kind stands under the title of a sub-plot that is on screen; None without any."""
+    title = view.title(panel).geometry()
+    below = [
+        each
+        for each in view.findChildren(kind, name)
+        if each.isVisible()
+        and each.y() > title.bottom()
+        and title.left() <= each.geometry().center().x() <= title.right()
+    ]
+    return min(below, key=lambda each: each.y(), default=None)
+
+
+def caption(view: sv.ShapeView, panel: Panel) -> QWidget:
+    found = beneath(view, panel, QLabel, "caption")
+    assert found is not None
+    return found
+
+
+def bar_of(view: sv.ShapeView, panel: Panel) -> ColourBar | None:
+    bar = beneath(view, panel, ColourBar)
+    assert bar is None or isinstance(bar, ColourBar)
+    return bar
+
+
+def mesh_in(view: sv.ShapeView, panel: Panel):
+    """The triangles that VTK draws in a sub-plot that is on screen."""
+    assert view.canvas is not None
+    middle = view.title(panel).geometry().center().x() / view.width()
+    here = [
+        renderer
+        for renderer in view.canvas.renderers
+        if renderer.GetInteractive() and renderer.GetViewport()[0] < middle < renderer.GetViewport()[2]
+    ]
+    (renderer,) = here
+    (actor,) = renderer.actors.values()
+    return actor.mapper.dataset
+
+
 def inside(view: sv.ShapeView, panel: Panel) -> tuple[slice, slice]:
     """Rows and columns of a sub-plot's shape in :func:`pixels`."""
-    title, volume = view.title(panel).geometry(), view._cells[panel].volume.geometry()
-    return slice(title.bottom() + 1, volume.top()), slice(title.left(), title.right() + 1)
+    title, below = view.title(panel).geometry(), caption(view, panel).geometry()
+    return slice(title.bottom() + 1, below.top()), slice(title.left(), title.right() + 1)
 
 
-def test_only_what_changed_is_drawn_and_all_of_it_at_once(view):
-    first, second = view._cells[TEMPLATE].result, view._cells[FULL_SHAPE].result
+def test_only_what_changed_is_drawn_and_all_of_it_at_once(view, surfaces):
+    first, second = surfaces[TEMPLATE], surfaces[FULL_SHAPE]
 
     def two_of_five() -> None:
         view.show_surface(moved(first, 1.0))
         view.show_surface(moved(second, 1.0))
 
     assert drawn_by(view, two_of_five) == [2]
-    assert drawn_by(view, lambda: view.show_surface(view._cells[TEMPLATE].result)) == []
-    assert drawn_by(view, view._canvas.update) == []
+    again = moved(first, 2.0)
+    assert drawn_by(view, lambda: view.show_surface(again)) == [1]
+    assert drawn_by(view, lambda: view.show_surface(again)) == []
+    assert drawn_by(view, view.canvas.update) == []
 
 
-def test_sub_plots_that_are_not_drawn_again_keep_their_pixels(view):
+def test_sub_plots_that_are_not_drawn_again_keep_their_pixels(view, surfaces):
     before = pixels(view)
     template, shape = inside(view, TEMPLATE), inside(view, FULL_SHAPE)
     assert len(np.unique(before[template].reshape(-1, 3), axis=0)) > 20
     for step in range(1, 4):
-        view.show_surface(moved(view._cells[FULL_SHAPE].result, 2.0 * step))
+        view.show_surface(moved(surfaces[FULL_SHAPE], 2.0 * step))
         QTest.qWait(30)
         now = pixels(view)
         np.testing.assert_array_equal(now[template], before[template])
         assert (now[shape] != before[shape]).any()
-    view._canvas.refresh()
+    view.canvas.refresh()
     np.testing.assert_allclose(pixels(view).astype(int), now, atol=3)
 
 
@@ -174,28 +191,28 @@ def test_sub_plots_that_are_not_drawn_again_keep_their_pixels(view):
         lambda view: view.resize(800, 500),
         lambda view: view.set_theme(DARK),
         lambda view: view.set_moving(True),
-        lambda view: QTest.mouseClick(view._canvas, Qt.MouseButton.LeftButton),
+        lambda view: QTest.mouseClick(view.canvas, Qt.MouseButton.LeftButton),
     ],
     ids=["direction", "framing", "size", "theme", "quality", "mouse"],
 )
-def test_what_concerns_all_draws_all(view, change):
-    assert drawn_by(view, lambda: change(view))[0] == len(view._visible)
+def test_what_concerns_all_draws_all(view, card, change):
+    assert drawn_by(view, lambda: change(view))[0] == len(all_panels(card))
 
 
-def test_moved_vertices_leave_the_triangles_in_opengl_alone(view):
-    mesh, result = view._canvas._plots[0].mesh, view._cells[TEMPLATE].result
+def test_moved_vertices_leave_the_triangles_in_opengl_alone(view, surfaces):
+    mesh, result = mesh_in(view, TEMPLATE), surfaces[TEMPLATE]
     triangles, since = mesh.GetPolys(), mesh.GetPolys().GetMTime()
     original = result.points_mm.copy()
     view.show_surface(moved(result, 5.0))
-    assert view._canvas._plots[0].mesh is mesh
+    assert mesh_in(view, TEMPLATE) is mesh
     assert mesh.GetPolys() is triangles
     assert triangles.GetMTime() == since
     assert mesh.bounds[5] == pytest.approx(original[:, 2].max() + 5, abs=1e-4)
     np.testing.assert_array_equal(result.points_mm, original)
 
 
-def test_a_moved_surface_is_drawn_like_a_new_one(view):
-    result = view._cells[FULL_SHAPE].result
+def test_a_moved_surface_is_drawn_like_a_new_one(view, surfaces):
+    result = surfaces[FULL_SHAPE]
     view.show_surface(moved(result, 6.0))
     in_place = pixels(view)
     view.show_surface(replace(moved(result, 6.0), faces=result.faces.copy()))
@@ -204,8 +221,8 @@ def test_a_moved_surface_is_drawn_like_a_new_one(view):
     assert (pixels(view) != in_place).any()
 
 
-def test_surfaces_shown_before_anything_can_draw_appear_later(qtbot, engine, card, monkeypatch):
-    monkeypatch.delitem(sys.modules, sv.DRAWING)
+def test_surfaces_shown_before_anything_can_draw_appear_later(qtbot, surfaces, card, monkeypatch):
+    monkeypatch.delitem(sys.modules, DRAWING)
     view = sv.ShapeView()
     qtbot.addWidget(view)
     view.resize(600, 400)
@@ -213,7 +230,7 @@ def test_surfaces_shown_before_anything_can_draw_appear_later(qtbot, engine, car
     view.show_panels(all_panels(card))
     assert not view.is_ready
     view.show()
-    show(view, engine, card)
+    show(view, surfaces)
     qtbot.waitUntil(lambda: view.is_ready, timeout=10_000)
     QTest.qWait(50)
     assert rows_of_colour(view, SHAPE_COLOUR) > 50
@@ -222,9 +239,9 @@ def test_surfaces_shown_before_anything_can_draw_appear_later(qtbot, engine, car
 
 def test_an_older_child_is_drawn_taller(view, engine, card):
     view.show_panels((FULL_SHAPE,))
-    show(view, engine, card)
+    show(view, computed(engine, card))
     young = rows_of_colour(view, SHAPE_COLOUR)
-    show(view, engine, card, age=200.0)
+    show(view, computed(engine, card, age=200.0))
     old = rows_of_colour(view, SHAPE_COLOUR)
     assert young > 100
     assert old / young == pytest.approx((45 + 15) / 45, rel=0.08)
@@ -245,16 +262,16 @@ def test_captions_are_shown_as_given(view):
 
 
 def test_all_sub_plots_share_one_camera(view):
-    assert len({id(renderer.camera) for renderer in view._canvas.renderers}) == 1
+    assert len({id(renderer.camera) for renderer in view.canvas.renderers}) == 1
 
 
-def test_the_mouse_turns_all_shapes_at_once_and_draws_once_per_paint(view):
-    canvas = view._canvas
+def test_the_mouse_turns_all_shapes_at_once_and_draws_once_per_paint(view, card):
+    canvas = view.canvas
     position = canvas.camera.position
     QTest.mousePress(canvas, Qt.MouseButton.LeftButton, pos=QPoint(100, 150))
     QTest.mouseMove(canvas, QPoint(160, 170))
     assert canvas.ren_win.GetMultiSamples() == 0
-    assert drawn_by(view, lambda: None) == [len(view._visible)]
+    assert drawn_by(view, lambda: None) == [len(all_panels(card))]
     QTest.mouseRelease(canvas, Qt.MouseButton.LeftButton, pos=QPoint(160, 170))
     assert canvas.ren_win.GetMultiSamples() == cv.REST_SAMPLES
     assert np.linalg.norm(np.subtract(canvas.camera.position, position)) > 1
@@ -265,22 +282,21 @@ def test_the_mouse_turns_all_shapes_at_once_and_draws_once_per_paint(view):
         canvas.refresh()
     QTest.qWait(50)
     view.drawn.disconnect(paintings.append)
-    assert paintings == [len(view._visible)]
+    assert paintings == [len(all_panels(card))]
 
 
 def test_the_users_zoom_survives_a_new_layout(view):
-    camera = view._canvas.camera
+    camera = view.canvas.camera
     camera.parallel_scale /= 2
-    zoomed = view._fit_scale / camera.parallel_scale
     view.show_panels((FULL_SHAPE,))
-    assert view._fit_scale / camera.parallel_scale == pytest.approx(zoomed)
+    zoomed = camera.parallel_scale
     view.reset_camera()
-    assert camera.parallel_scale == pytest.approx(view._fit_scale)
+    assert camera.parallel_scale / zoomed == pytest.approx(2.0)
 
 
 def test_directions_are_anatomical(view):
     view.look_from("the front")
-    camera = view._canvas.camera
+    camera = view.canvas.camera
     forward = np.subtract(camera.focal_point, camera.position)
     np.testing.assert_allclose(forward / np.linalg.norm(forward), [0, 1, 0], atol=1e-6)  # y points backwards
 
@@ -294,7 +310,7 @@ def test_sampling_is_off_while_moving_and_made_up_for_at_rest(view):
 
 
 def test_no_surface_leaves_the_sub_plot_empty(view, engine, card, atlas, monkeypatch):
-    monkeypatch.setattr(atlas, "_surface", lambda *_: trimesh.Trimesh())
+    monkeypatch.setattr(atlas, "template", lambda *_, **__: trimesh.Trimesh())
     empty = engine.surface(SurfaceRequest(card.path, TEMPLATE, (), 48))
     for _ in range(2):
         view.show_surface(replace(empty))
@@ -303,35 +319,30 @@ def test_no_surface_leaves_the_sub_plot_empty(view, engine, card, atlas, monkeyp
     assert (pixels(view)[inside(view, TEMPLATE)] == (canvas.red(), canvas.green(), canvas.blue())).all()
 
 
-def test_another_atlas_gets_a_canvas_of_its_own(view, engine, card):
-    first = view._canvas
+def test_another_atlas_gets_a_canvas_of_its_own(view, surfaces, card):
+    closed: list[bool] = []
+    view.canvas.destroyed.connect(lambda: closed.append(True))
     view.show_atlas(card, DARK)
     view.show_panels((TEMPLATE, FULL_SHAPE))
-    assert first._closed
-    show(view, engine, card)
+    show(view, surfaces)
+    assert closed == [True]
     assert rows_of_colour(view, SHAPE_COLOUR) > 50
 
 
 @pytest.fixture
-def views(view) -> sv.ShapeView:
+def views(view, surfaces) -> sv.ShapeView:
     """The sub-plots of a fit with one surface in all of them, seen from the left."""
     view.show_panels((FULL_SHAPE, SCAN, CERTAINTY))
     for panel in (FULL_SHAPE, SCAN, CERTAINTY, BEFORE, CHANGE):
-        view.show_surface(of(view, panel))
+        view.show_surface(of(surfaces, panel))
     view.look_from("the left")
     QTest.qWait(30)
     return view
 
 
-def template(view: sv.ShapeView) -> SurfaceResult:
-    result = view._cells[TEMPLATE].result
-    assert result is not None
-    return result
-
-
-def of(view: sv.ShapeView, panel: Panel, values_mm=None, limit_mm: float = 2.0) -> SurfaceResult:
+def of(surfaces: Surfaces, panel: Panel, values_mm=None, limit_mm: float = 2.0) -> SurfaceResult:
     """The template's surface in another panel, coloured where there are values."""
-    result, colouring = template(view), None
+    result, colouring = surfaces[TEMPLATE], None
     if values_mm is not None:
         values_mm = np.broadcast_to(np.asarray(values_mm, np.float32), len(result.points_mm)).copy()
         colouring = Colouring(values_mm, limit_mm, is_signed=panel != CERTAINTY)
@@ -351,8 +362,8 @@ def rgb(colour: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("panel", "share"), [(SCAN, -1.0), (SCAN, 0.0), (SCAN, 1.0), (CERTAINTY, 0.5)])
-def test_a_surface_has_the_colours_of_its_bar(views, panel, share):
-    views.show_surface(of(views, panel, 2.0 * share))
+def test_a_surface_has_the_colours_of_its_bar(views, panel, share, surfaces):
+    views.show_surface(of(surfaces, panel, 2.0 * share))
     place = share if panel == CERTAINTY else (share + 1) / 2
     colours = scale_colours(is_signed=panel == SCAN)
     seen, expected = middle(views, panel), rgb(colours[round(place * (len(colours) - 1))])
@@ -361,16 +372,16 @@ def test_a_surface_has_the_colours_of_its_bar(views, panel, share):
     assert np.linalg.norm(seen - expected) < 1.01 * min(np.linalg.norm(seen - other) for other in others)
 
 
-def test_beyond_the_scale_the_colour_is_that_of_its_end(views):
-    views.show_surface(of(views, SCAN, 2.0))
+def test_beyond_the_scale_the_colour_is_that_of_its_end(views, surfaces):
+    views.show_surface(of(surfaces, SCAN, 2.0))
     at_the_end = pixels(views)
-    views.show_surface(of(views, SCAN, 40.0))
+    views.show_surface(of(surfaces, SCAN, 40.0))
     np.testing.assert_array_equal(pixels(views), at_the_end)
 
 
-def test_vertices_differ(views):
-    heights = template(views).points_mm[:, 2]
-    views.show_surface(of(views, SCAN, np.sign(heights)))
+def test_vertices_differ(views, surfaces):
+    heights = surfaces[TEMPLATE].points_mm[:, 2]
+    views.show_surface(of(surfaces, SCAN, np.sign(heights)))
     rows, columns = inside(views, SCAN)
     shape = pixels(views)[rows, columns].astype(int)
     redder = (shape[:, :, 0] - shape[:, :, 2]).sum(axis=1)
@@ -378,64 +389,69 @@ def test_vertices_differ(views):
     assert redder[: half - 5].sum() > 1000 and redder[half + 5 :].sum() < -1000
 
 
-def test_colours_come_and_go_without_new_triangles(views):
-    plot = views._canvas._plots[views._index(SCAN)]
-    plain, mesh = pixels(views), plot.mesh
+def test_colours_come_and_go_without_new_triangles(views, surfaces):
+    plain, mesh = pixels(views), mesh_in(views, SCAN)
     triangles, since = mesh.GetPolys(), mesh.GetPolys().GetMTime()
-    assert drawn_by(views, lambda: views.show_surface(of(views, SCAN, 1.0))) == [1]
+    assert drawn_by(views, lambda: views.show_surface(of(surfaces, SCAN, 1.0))) == [1]
     coloured = pixels(views)
     assert (coloured != plain).any()
-    assert drawn_by(views, lambda: views.show_surface(of(views, SCAN, -1.0))) == [1]
+    assert drawn_by(views, lambda: views.show_surface(of(surfaces, SCAN, -1.0))) == [1]
     assert (pixels(views) != coloured).any()
-    assert drawn_by(views, lambda: views.show_surface(of(views, SCAN))) == [1]
+    assert drawn_by(views, lambda: views.show_surface(of(surfaces, SCAN))) == [1]
     np.testing.assert_array_equal(pixels(views), plain)
-    views.show_surface(moved(of(views, SCAN, 1.0), 3.0))
-    assert plot.mesh is mesh and mesh.GetPolys() is triangles and triangles.GetMTime() == since
+    views.show_surface(moved(of(surfaces, SCAN, 1.0), 3.0))
+    assert mesh_in(views, SCAN) is mesh and mesh.GetPolys() is triangles and triangles.GetMTime() == since
 
 
-def test_a_moved_coloured_surface_is_drawn_like_a_new_one(views):
-    views.show_surface(of(views, SCAN, 1.0))
-    result = moved(of(views, SCAN, -0.5), 4.0)
+def test_a_moved_coloured_surface_is_drawn_like_a_new_one(views, surfaces):
+    views.show_surface(of(surfaces, SCAN, 1.0))
+    result = moved(of(surfaces, SCAN, -0.5), 4.0)
     views.show_surface(result)
     in_place = pixels(views)
     views.show_surface(replace(result, faces=result.faces.copy()))
     np.testing.assert_array_equal(pixels(views), in_place)
 
 
-def test_a_colour_bar_stands_between_shape_and_caption(views):
-    cell = views._cells[SCAN]
-    with_bar = {panel for panel, each in views._cells.items() if each.bar is not None}
+def test_a_colour_bar_stands_between_shape_and_caption(views, card):
+    with_bar = set()
+    for panels in (all_panels(card), (BEFORE, FULL_SHAPE, CHANGE), (FULL_SHAPE, SCAN, CERTAINTY)):
+        views.show_panels(panels)
+        with_bar |= {panel for panel in panels if bar_of(views, panel) is not None}
     assert with_bar == {SCAN, CERTAINTY, CHANGE}
-    bar, shape = cell.bar.geometry(), inside(views, SCAN)[0]
-    text_top = cell.volume.geometry().top() + cell.volume.contentsMargins().top()
-    assert shape.stop <= bar.top() and bar.bottom() < text_top
+    bar, shape, below = bar_of(views, SCAN), inside(views, SCAN)[0], caption(views, SCAN)
+    assert bar is not None
+    place = bar.geometry()
+    text_top = below.geometry().top() + below.contentsMargins().top()
+    assert shape.stop <= place.top() and place.bottom() < text_top
     assert views.height() - text_top == CAPTION_PX
-    assert cell.bar.isVisible() and abs(bar.center().x() - cell.title.geometry().center().x()) <= 1
-    plain = views._cells[FULL_SHAPE].volume
+    assert abs(place.center().x() - views.title(SCAN).geometry().center().x()) <= 1
+    plain = caption(views, FULL_SHAPE)
     assert plain.geometry().top() + plain.contentsMargins().top() == text_top
 
 
-def test_the_bar_keeps_its_numbers_while_a_preview_is_plain(views):
-    bar = views._cells[CHANGE].bar
+def test_the_bar_keeps_its_numbers_while_a_preview_is_plain(views, surfaces):
+    views.show_panels((BEFORE, FULL_SHAPE, CHANGE))
+    bar = bar_of(views, CHANGE)
+    assert bar is not None
     assert bar.limit_mm is None
-    views.show_surface(of(views, CHANGE, 1.0, limit_mm=5.0))
-    views.show_surface(of(views, CHANGE))
+    views.show_surface(of(surfaces, CHANGE, 1.0, limit_mm=5.0))
+    views.show_surface(of(surfaces, CHANGE))
     assert bar.limit_mm == 5.0
 
 
 def test_the_usual_layouts_have_no_strip_for_bars(view, card):
-    usual, labels = pixels(view), view._cells[FULL_SHAPE].volume.geometry()
+    usual, labels = pixels(view), caption(view, FULL_SHAPE).geometry()
     view.show_panels((FULL_SHAPE, SCAN, CERTAINTY))
     view.show_panels(all_panels(card))
     np.testing.assert_array_equal(pixels(view), usual)
-    assert view._cells[FULL_SHAPE].volume.geometry() == labels
-    assert not any(cell.bar.isVisible() for cell in view._cells.values() if cell.bar is not None)
+    assert caption(view, FULL_SHAPE).geometry() == labels
+    assert not any(bar.isVisible() for bar in view.findChildren(ColourBar))
 
 
-def test_hidden_sub_plots_are_not_drawn(view):
+def test_hidden_sub_plots_are_not_drawn(view, surfaces):
     def all_of_a_patient() -> None:
         for panel in (SCAN, CERTAINTY, BEFORE, CHANGE):
-            view.show_surface(of(view, panel))
+            view.show_surface(of(surfaces, panel))
 
     assert drawn_by(view, all_of_a_patient) == []
 
@@ -447,17 +463,17 @@ def test_panels_stand_in_the_order_asked_for(views):
     assert not views.title(SCAN).isVisible()
 
 
-def ghost_of(view: sv.ShapeView, scale: float) -> tuple[np.ndarray, np.ndarray]:
-    result = template(view)
+def ghost_of(surfaces: Surfaces, scale: float) -> tuple[np.ndarray, np.ndarray]:
+    result = surfaces[TEMPLATE]
     return result.points_mm * np.float32(scale), result.faces
 
 
 @pytest.mark.parametrize(("theme", "is_darker"), [(LIGHT, True), (DARK, False)], ids=["light", "dark"])
-def test_a_ghost_lies_over_the_full_shape_alone(views, theme, is_darker):
+def test_a_ghost_lies_over_the_full_shape_alone(views, theme, is_darker, surfaces):
     views.set_theme(theme)
     QTest.qWait(30)
     before, bare = pixels(views), middle(views, FULL_SHAPE)
-    points_mm, faces = ghost_of(views, 1.1)
+    points_mm, faces = ghost_of(surfaces, 1.1)
     assert drawn_by(views, lambda: views.show_ghost(points_mm, faces)) == [1]
     assert drawn_by(views, lambda: views.show_ghost(points_mm, faces)) == []
     after, veiled = pixels(views), middle(views, FULL_SHAPE)
@@ -471,16 +487,16 @@ def test_a_ghost_lies_over_the_full_shape_alone(views, theme, is_darker):
     np.testing.assert_array_equal(pixels(views), before)
 
 
-def test_a_ghost_inside_the_shape_is_hidden(views):
+def test_a_ghost_inside_the_shape_is_hidden(views, surfaces):
     before = pixels(views)
-    views.show_ghost(*ghost_of(views, 0.8))
+    views.show_ghost(*ghost_of(surfaces, 0.8))
     np.testing.assert_array_equal(pixels(views), before)
 
 
-def test_a_ghost_stays_where_it_is_while_the_shape_moves(views):
-    views.show_ghost(*ghost_of(views, 1.1))
+def test_a_ghost_stays_where_it_is_while_the_shape_moves(views, surfaces):
+    views.show_ghost(*ghost_of(surfaces, 1.1))
     before = pixels(views)
-    start = of(views, FULL_SHAPE)
+    start = of(surfaces, FULL_SHAPE)
     for step in (3.0, 6.0):
         views.show_surface(moved(start, step))
         QTest.qWait(20)
@@ -489,44 +505,46 @@ def test_a_ghost_stays_where_it_is_while_the_shape_moves(views):
     np.testing.assert_array_equal(pixels(views), before)
 
 
-def test_a_ghost_is_framed_with_the_shapes(views):
-    alone = views._canvas.box_mm()
-    views.show_ghost(*ghost_of(views, 1.5))
-    np.testing.assert_allclose(views._canvas.box_mm(), 1.5 * alone, atol=0.1)
+def test_a_ghost_is_framed_with_the_shapes(views, surfaces):
+    alone = views.canvas.box_mm()
+    views.show_ghost(*ghost_of(surfaces, 1.5))
+    np.testing.assert_allclose(views.canvas.box_mm(), 1.5 * alone, atol=0.1)
     views.show_panels((SCAN, CERTAINTY))
-    np.testing.assert_allclose(views._canvas.box_mm(), alone, atol=0.1)
+    np.testing.assert_allclose(views.canvas.box_mm(), alone, atol=0.1)
 
 
-def test_a_ghost_of_points_is_dotted(views):
+def test_a_ghost_of_points_is_dotted(views, surfaces):
     before = pixels(views)
-    views.show_ghost(ghost_of(views, 1.2)[0])
+    views.show_ghost(ghost_of(surfaces, 1.2)[0])
     changed = (pixels(views) != before).any(axis=2)
     surface = (before[inside(views, FULL_SHAPE)] != rgb(LIGHT.canvas)).any(axis=2).sum()
     assert 100 < changed[inside(views, FULL_SHAPE)].sum() < 0.6 * surface
     assert changed.sum() == changed[inside(views, FULL_SHAPE)].sum()
 
 
-def test_a_new_atlas_has_no_ghost(views, card):
-    views.show_ghost(*ghost_of(views, 1.1))
+def test_a_new_atlas_has_no_ghost(views, card, surfaces):
+    views.show_ghost(*ghost_of(surfaces, 1.1))
     views.show_atlas(card, LIGHT)
-    assert views._canvas._plots[views._index(FULL_SHAPE)].ghost is None
+    views.show_panels((FULL_SHAPE, SCAN))
+    QTest.qWait(30)
+    assert (pixels(views)[inside(views, FULL_SHAPE)] == rgb(LIGHT.canvas)).all()
 
 
-def cloud(view: sv.ShapeView, values_mm=None) -> SurfaceResult:
-    result = of(view, SCAN, values_mm)
+def cloud(surfaces: Surfaces, values_mm=None) -> SurfaceResult:
+    result = of(surfaces, SCAN, values_mm)
     return replace(result, faces=result.faces[:0], normals=np.zeros_like(result.normals))
 
 
-def test_a_cloud_is_drawn_as_points(views):
+def test_a_cloud_is_drawn_as_points(views, surfaces):
     whole = (pixels(views)[inside(views, SCAN)] != rgb(LIGHT.canvas)).any(axis=2).sum()
-    views.show_surface(cloud(views))
+    views.show_surface(cloud(surfaces))
     dots = pixels(views)[inside(views, SCAN)]
     is_dot = (dots != rgb(LIGHT.canvas)).any(axis=2)
     assert 300 < is_dot.sum() < whole
     assert abs(QColor(*map(int, np.median(dots[is_dot], axis=0))).hue() - QColor(SCAN_COLOUR).hue()) < 20
-    views.show_surface(cloud(views, 2.0))
+    views.show_surface(cloud(surfaces, 2.0))
     coloured = pixels(views)[inside(views, SCAN)]
     reds = coloured[(coloured != rgb(LIGHT.canvas)).any(axis=2)]
     assert (reds[:, 0].astype(int) - reds[:, 2] > 60).mean() > 0.5
-    views.show_surface(of(views, SCAN))
+    views.show_surface(of(surfaces, SCAN))
     assert (pixels(views)[inside(views, SCAN)] != rgb(LIGHT.canvas)).any(axis=2).sum() == whole

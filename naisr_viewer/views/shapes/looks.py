@@ -1,0 +1,90 @@
+"""How surfaces look: their polygons, their light, the colours of their vertices, and ghosts over them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyvista as pv
+from numpy.typing import NDArray
+
+from naisr_viewer.state.requests import SurfaceResult
+from naisr_viewer.views.colours import scale_colours
+
+TABLE_COLOURS = 256
+"""Colours of a scale that OpenGL is told; enough to look like a gradient."""
+
+SHINY = {"ambient": 0.25, "diffuse": 0.9, "specular": 0.2, "specular_power": 25}
+"""Light on a plain surface."""
+
+MATT = {"ambient": 0.45, "diffuse": 0.6, "specular": 0.0}
+"""Light on a surface whose colours are to be compared with a colour bar."""
+
+POINT_PX = 5
+GHOST_POINT_PX = 3
+"""Diameter of the points of a cloud."""
+
+GHOST_OPACITY = 0.35
+GHOST_DEPTH = 80.0
+"""By how much a ghost is drawn farther away, in VTK's units, of which 65,000 span the depth of the view:
+where it as good as touches the shape, which of them is in front would be left to chance."""
+
+
+def is_closed(faces: NDArray[np.int64]) -> bool:
+    """Whether every edge is passed once in each direction, so that no back face can be seen from outside.
+
+    Args:
+        faces: vertex numbers of triangles, ``[m, 3]``.
+    """
+    if len(faces) == 0:
+        return False
+    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    count = int(faces.max()) + 1
+    return bool(np.array_equal(np.sort(start * count + end), np.sort(end * count + start)))
+
+
+def as_polydata(result: SurfaceResult) -> pv.PolyData:
+    """The surface with its normals; vertices are copied, because later frames overwrite them in place."""
+    if is_cloud(result.points_mm, result.faces):
+        return pv.PolyData(result.points_mm.copy())
+    if len(result.faces) == 0:
+        return pv.PolyData()
+    mesh = pv.PolyData.from_regular_faces(result.points_mm.copy(), result.faces)
+    mesh.point_data.active_normals = result.normals.copy()
+    return mesh
+
+
+def is_cloud(points_mm: NDArray[np.float32], faces: NDArray[np.int64]) -> bool:
+    """Whether these are points without a surface."""
+    return len(points_mm) > 0 and len(faces) == 0
+
+
+def look_up_table(limit_mm: float, is_signed: bool) -> pv.LookupTable:
+    """The colours of a scale for VTK; values beyond its ends have the colours of the ends."""
+    stops = np.array([pv.Color(colour).int_rgb for colour in scale_colours(is_signed)], float)
+    places = np.linspace(0, len(stops) - 1, TABLE_COLOURS)
+    colours = [np.interp(places, range(len(stops)), channel) for channel in stops.T]
+    table = pv.LookupTable(n_values=TABLE_COLOURS)
+    table.values = np.stack([*colours, np.full(TABLE_COLOURS, 255.0)], axis=1).round().astype(np.uint8)
+    table.scalar_range = (-limit_mm if is_signed else 0.0, limit_mm)
+    return table
+
+
+def as_ghost(points_mm: NDArray[np.float32], faces: NDArray[np.int64]) -> pv.Actor:
+    """The look of a scan that lies over a shape: translucent, or dots where it has no surface.
+
+    Of a closed surface only the side towards the eye is drawn, so that no two layers are ever mixed in the
+    wrong order.
+    """
+    if is_cloud(points_mm, faces):
+        actor = pv.Actor(mapper=pv.DataSetMapper(pv.PolyData(points_mm)))
+        actor.prop.point_size, actor.prop.lighting = GHOST_POINT_PX, False
+        return actor
+    mesh = pv.PolyData.from_regular_faces(points_mm, faces)
+    mesh.compute_normals(cell_normals=False, split_vertices=False, consistent_normals=False, inplace=True)
+    actor = pv.Actor(mapper=pv.DataSetMapper(mesh))
+    actor.mapper.scalar_visibility = False
+    actor.mapper.SetResolveCoincidentTopologyToPolygonOffset()
+    actor.mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(0.0, GHOST_DEPTH)
+    actor.prop.interpolation, actor.prop.ambient, actor.prop.specular = "Phong", 0.5, 0.0
+    actor.prop.opacity = GHOST_OPACITY
+    actor.prop.culling = "back" if is_closed(faces) else "none"
+    return actor

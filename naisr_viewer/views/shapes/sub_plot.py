@@ -1,0 +1,61 @@
+"""One renderer with one surface, and how that is replaced."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pyvista as pv
+
+from naisr_viewer.state.requests import Colouring, SurfaceResult
+from naisr_viewer.views.shapes.looks import MATT, SHINY, as_polydata, is_closed, look_up_table
+
+
+@dataclass(eq=False)
+class SubPlot:
+    """One renderer with one surface.
+
+    Attributes:
+        renderer: draws into its part of the canvas.
+        actor: the surface's look.
+        mesh: the surface as VTK knows it; its contents are replaced in place.
+        result: what ``mesh`` was made from.
+        ghost: the look of what lies over the surface.
+        is_shown: whether it has a part of the canvas.
+        is_stale: whether the canvas shows something else.
+    """
+
+    renderer: pv.Renderer
+    actor: pv.Actor
+    mesh: pv.PolyData
+    result: SurfaceResult | None = None
+    ghost: pv.Actor | None = None
+    is_shown: bool = False
+    is_stale: bool = True
+
+    @property
+    def boxes(self) -> list[tuple[float, ...]]:
+        """Bounds of what is drawn, each x, y and z from and to (mm)."""
+        boxes = [self.mesh.bounds] if self.mesh.n_points else []
+        return [*boxes, self.ghost.bounds] if self.ghost is not None else boxes
+
+
+def set_points(plot: SubPlot, old: SurfaceResult | None, result: SurfaceResult) -> None:
+    """Replace the surface of a sub-plot, or only its vertices where it has the same triangles."""
+    if old is not None and old.faces is result.faces and len(result.faces):
+        plot.mesh.points[:] = result.points_mm
+        plot.mesh.point_data.active_normals[:] = result.normals
+    else:
+        plot.mesh.copy_from(as_polydata(result), deep=False)
+        plot.actor.prop.culling = "back" if is_closed(result.faces) else "none"
+
+
+def set_colouring(plot: SubPlot, colouring: Colouring | None) -> None:
+    """Colour the vertices of a sub-plot, or all of it in its own colour."""
+    mapper = plot.actor.mapper
+    mapper.scalar_visibility = colouring is not None
+    for name, value in (SHINY if colouring is None else MATT).items():
+        setattr(plot.actor.prop, name, value)
+    if colouring is not None:
+        plot.mesh.point_data.set_scalars(colouring.values_mm, "mm")
+        mapper.lookup_table = look_up_table(colouring.limit_mm, colouring.is_signed)
+        mapper.use_lookup_table_scalar_range = True
