@@ -1,14 +1,16 @@
-"""Which file to open, and where a picture goes."""
+"""Which files to open, chosen or dropped, and where a picture goes."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+from PySide6.QtCore import QMimeData
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from naisr_viewer.state.explorer import ExplorerState
 
-ATLAS_FILTER = "Atlas (*.safetensors);;All files (*)"
+ATLAS_ENDING = ".safetensors"
+ATLAS_FILTER = f"Atlas (*{ATLAS_ENDING});;All files (*)"
 SCAN_ENDINGS = ("stl", "ply", "obj", "vtk", "vtp", "glb", "nii", "nii.gz", "nrrd", "csv", "txt", "xyz")
 """Meshes, label volumes and text files of points that can be opened as a scan."""
 
@@ -39,3 +41,13 @@ def ask_image_path(parent: QWidget, state: ExplorerState) -> Path | None:
     proposal = f"{state.atlas.name if state.atlas else 'atlas'}.png"
     name, _ = QFileDialog.getSaveFileName(parent, "Save a picture", proposal, "PNG (*.png)")
     return Path(name).with_suffix(".png") if name else None
+
+
+def dropped(data: QMimeData) -> list[Path]:
+    """The files on this machine among what was dropped."""
+    return [Path(url.toLocalFile()) for url in data.urls() if url.isLocalFile()]
+
+
+def is_atlas(file: Path) -> bool:
+    """Whether a file has the ending of an atlas."""
+    return file.suffix.lower() == ATLAS_ENDING

@@ -1,0 +1,287 @@
+"""What the user can tell the window to do: commands as values, from which menus and toolbar are made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass
+from enum import Enum, auto
+from typing import Protocol
+
+from PySide6.QtCore import QObject, Qt, SignalInstance
+from PySide6.QtGui import QAction, QActionGroup, QKeySequence
+from PySide6.QtWidgets import QMenu, QToolBar, QWidget
+
+from naisr_viewer.state.explorer import OF_A_PATIENT, Layout
+from naisr_viewer.state.theme import ThemeChoice
+from naisr_viewer.views.covariates.panel import CovariatePanel
+from naisr_viewer.views.shapes.camera import DIRECTIONS
+from naisr_viewer.views.shapes.shape_view import ShapeView
+
+
+class Fact(Enum):
+    """What may be so, and what commands may need to be so."""
+
+    ATLAS = auto()  # an atlas is open
+    REST = auto()  # nothing is being opened, fitted or exported
+    FIT = auto()  # the patient that is shown has been fitted
+    PAST = auto()  # a change of the covariates can be undone
+    FUTURE = auto()  # one that was undone can be redone
+
+
+class Window(Protocol):
+    """What the commands act on."""
+
+    covariates: CovariatePanel
+    shapes: ShapeView
+    undo_requested: SignalInstance
+    redo_requested: SignalInstance
+    layout_requested: SignalInstance
+    theme_requested: SignalInstance
+    about_requested: SignalInstance
+
+    def ask_atlas(self) -> None:
+        """Let an atlas be chosen and opened."""
+
+    def ask_scan(self) -> None:
+        """Let a patient's file be chosen and opened."""
+
+    def ask_export(self) -> None:
+        """Let surfaces be chosen and written."""
+
+    def ask_screenshot(self) -> None:
+        """Let a place be chosen for a picture."""
+
+    def show_sides(self) -> None:
+        """Show the panels beside the shapes that are switched on."""
+
+    def close(self) -> bool:
+        """Close the window."""
+
+
+@dataclass(frozen=True)
+class Command:
+    """One thing that can be told.
+
+    Attributes:
+        name: what menus and toolbar call it.
+        text: what the user reads; with ``…`` where a dialog comes first.
+        act: what is done.
+        keys: shortcuts, the one that is shown first.
+        tip: more than the text, on hover.
+        needs: what must be so.
+        group: of which one is chosen; empty for a command that stands alone.
+        is_switch: whether it is on or off.
+    """
+
+    name: str
+    text: str
+    act: Callable[[Window], object]
+    keys: tuple[str, ...] = ()
+    tip: str = ""
+    needs: frozenset[Fact] = frozenset()
+    group: str = ""
+    is_switch: bool = False
+
+    @property
+    def hint(self) -> str:
+        """What is told on hover, with the shortcut."""
+        return f"{self.tip or self.text.rstrip('…')} ({self.keys[0]})" if self.keys else self.tip
+
+
+OPEN = frozenset({Fact.ATLAS})
+AT_REST = OPEN | {Fact.REST}
+
+
+def _layout(layout: Layout, number: int) -> Command:
+    return Command(
+        f"layout {layout}",
+        layout.capitalize(),
+        lambda window: window.layout_requested.emit(layout),
+        keys=(f"Ctrl+{number}",),
+        needs=OPEN | {Fact.FIT} if layout in OF_A_PATIENT else OPEN,
+        group="layout",
+    )
+
+
+def _look(direction: str, number: int) -> Command:
+    return Command(
+        f"from {direction}",
+        f"From {direction}",
+        lambda window: window.shapes.look_from(direction),
+        keys=(f"Alt+{number}",),
+        needs=OPEN,
+    )
+
+
+def _theme(choice: ThemeChoice) -> Command:
+    return Command(
+        f"theme {choice}",
+        f"{choice.capitalize()} theme",
+        lambda window: window.theme_requested.emit(choice),
+        group="theme",
+    )
+
+
+LAYOUTS = tuple(_layout(layout, number) for number, layout in enumerate(Layout, start=1))
+LOOKS = tuple(_look(direction, number) for number, direction in enumerate(DIRECTIONS, start=1))
+THEMES = tuple(_theme(choice) for choice in ThemeChoice)
+
+COMMANDS = (
+    Command(
+        "open atlas",
+        "Open atlas…",
+        lambda window: window.ask_atlas(),
+        keys=("Ctrl+O",),
+        tip="Open another atlas",
+    ),
+    Command(
+        "open scan",
+        "Open scan…",
+        lambda window: window.ask_scan(),
+        keys=("Ctrl+Shift+O",),
+        tip="Open a patient's shape to fit the atlas to it",
+        needs=AT_REST,
+    ),
+    Command(
+        "export",
+        "Export…",
+        lambda window: window.ask_export(),
+        keys=("Ctrl+E",),
+        tip="Write surfaces to files",
+        needs=AT_REST,
+    ),
+    Command(
+        "screenshot",
+        "Screenshot…",
+        lambda window: window.ask_screenshot(),
+        keys=("Ctrl+S",),
+        tip="Save a picture of the window",
+        needs=OPEN,
+    ),
+    Command("quit", "Quit", lambda window: window.close(), keys=("Ctrl+Q",)),
+    Command(
+        "undo",
+        "Undo",
+        lambda window: window.undo_requested.emit(),
+        keys=("Ctrl+Z",),
+        tip="Undo the last change of a covariate",
+        needs=frozenset({Fact.REST, Fact.PAST}),
+    ),
+    Command(
+        "redo",
+        "Redo",
+        lambda window: window.redo_requested.emit(),
+        keys=("Ctrl+Shift+Z", "Ctrl+Y"),
+        tip="Redo what was undone",
+        needs=frozenset({Fact.REST, Fact.FUTURE}),
+    ),
+    Command(
+        "reset all",
+        "Reset all covariates",
+        lambda window: window.covariates.reset_all_requested.emit(),
+        keys=("Ctrl+R",),
+        needs=AT_REST,
+    ),
+    *LAYOUTS,
+    Command(
+        "patients",
+        "Patients",
+        lambda window: window.show_sides(),
+        keys=("Ctrl+P",),
+        tip="Show the patients",
+        needs=OPEN,
+        is_switch=True,
+    ),
+    Command(
+        "reset camera",
+        "Reset camera",
+        lambda window: window.shapes.reset_camera(),
+        keys=("Ctrl+0",),
+        tip="Frame the shapes",
+        needs=OPEN,
+    ),
+    *LOOKS,
+    *THEMES,
+    Command("about", "About", lambda window: window.about_requested.emit()),
+)
+"""All that can be told."""
+
+SEPARATOR = ""
+"""A line between entries."""
+
+RECENT = "open recent"
+"""The entry that opens a menu of files, which the window fills."""
+
+
+def _names(commands: Sequence[Command]) -> tuple[str, ...]:
+    return tuple(command.name for command in commands)
+
+
+MENUS = {
+    "&File": ("open atlas", "open scan", RECENT, SEPARATOR, "export", "screenshot", SEPARATOR, "quit"),
+    "&Edit": ("undo", "redo", "reset all"),
+    "&View": (
+        *_names(LAYOUTS), "patients", SEPARATOR, "reset camera", *_names(LOOKS), SEPARATOR, *_names(THEMES),
+    ),
+    "&Help": ("about",),
+}  # fmt: skip
+"""What stands in the menu bar, by name."""
+
+TOOLBAR = (
+    "open atlas", "open scan", "export", "screenshot", SEPARATOR,
+    *_names(LAYOUTS), SEPARATOR,
+    "undo", "redo", "reset camera",
+)  # fmt: skip
+"""What stands in the toolbar, by name."""
+
+
+def make_actions(commands: Sequence[Command], window: Window, parent: QObject) -> dict[str, QAction]:
+    """What Qt shows of the commands, by name.
+
+    Args:
+        commands: what can be told.
+        window: what they act on.
+        parent: who owns the actions.
+    """
+    actions = {command.name: _action(command, window, parent) for command in commands}
+    for group in sorted({command.group for command in commands if command.group}):
+        choices = QActionGroup(parent)
+        for command in commands:
+            if command.group == group:
+                choices.addAction(actions[command.name])
+    return actions
+
+
+def _action(command: Command, window: Window, parent: QObject) -> QAction:
+    action = QAction(command.text, parent)
+    action.triggered.connect(lambda _=False: command.act(window))
+    action.setShortcuts([QKeySequence(keys) for keys in command.keys])
+    action.setToolTip(command.hint)
+    action.setCheckable(command.is_switch or bool(command.group))
+    return action
+
+
+def fill(target: QMenu | QToolBar, names: Sequence[str], actions: Mapping[str, QAction]) -> None:
+    """Put the actions of these names into a menu or a toolbar, with lines between them."""
+    for name in names:
+        if name == SEPARATOR:
+            target.addSeparator()
+        else:
+            target.addAction(actions[name])
+
+
+def make_toolbar(actions: Mapping[str, QAction], parent: QWidget) -> QToolBar:
+    """The toolbar, which stays where it is."""
+    bar = QToolBar("Main", parent)
+    bar.setMovable(False)
+    bar.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextOnly)
+    bar.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
+    fill(bar, TOOLBAR, actions)
+    return bar
+
+
+def enable(commands: Sequence[Command], actions: Mapping[str, QAction], facts: AbstractSet[Fact]) -> None:
+    """Enable the commands whose needs are met by what is so."""
+    for command in commands:
+        actions[command.name].setEnabled(command.needs <= facts)
