@@ -13,22 +13,19 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
-from naisr_model.covariates import Covariate
 from naisr_viewer.state.explorer import AtlasCard, ExplorerState, opened, with_patient, with_value
 from naisr_viewer.state.patients import Fitted, Patient, Reading, Scan
 from naisr_viewer.views.colours import covariate_colour
 from naisr_viewer.views.covariates import panel as cp
-from naisr_viewer.views.covariates.histogram import BAND_PX, Histogram, bin_counts
+from naisr_viewer.views.covariates.histogram import BAND_PX, Histogram
 from naisr_viewer.views.covariates.row import SETTLE_MS
 from naisr_viewer.views.covariates.slider import (
     HANDLE_PX,
     SLIDER_STEPS,
     JumpSlider,
     slider_position,
-    slider_value,
 )
 from naisr_viewer.views.theme import DARK, LIGHT, palette
-from naisr_viewer.words.numbers import decimals
 
 
 @pytest.fixture
@@ -54,28 +51,6 @@ def heard(panel) -> list[tuple[str, str, float]]:
 def at(slider: JumpSlider, share: float) -> QPoint:
     x = HANDLE_PX / 2 + share * (slider.width() - HANDLE_PX)
     return QPoint(round(x), slider.height() // 2)
-
-
-def test_slider_positions_and_real_values_agree(card):
-    for covariate in card.covariates:
-        for value in np.linspace(covariate.range[0], covariate.range[1], 7):
-            position = slider_position(covariate, value)
-            step = (covariate.range[1] - covariate.range[0]) / SLIDER_STEPS
-            assert abs(slider_value(covariate, position) - value) <= step
-
-
-def test_digits_suit_the_range():
-    def of(low: float, high: float) -> int:
-        return decimals(Covariate("x", "", "continuous", 0, 1, (low, high)))
-
-    assert (of(1, 233), of(3.9, 94), of(0, 1), of(0, 5000)) == (0, 1, 2, 0)
-
-
-def test_the_histogram_counts_everybody(card):
-    for covariate in card.covariates:
-        observed = card.population.observed(covariate.name)
-        assert bin_counts(covariate, observed).sum() == len(observed)
-    assert len(bin_counts(card.covariates[2], np.array([-1.0, -1.0, 1.0]))) == 2
 
 
 def test_showing_a_value_says_nothing(panel, heard, card):

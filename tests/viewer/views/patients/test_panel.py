@@ -7,22 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, QPointF, Qt, QTimer
+from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QScrollArea, QToolButton, QWidget
 from pytestqt.qtbot import QtBot
 
-from naisr_model.data import meshes, volumes
-from naisr_model.data.patients import POINT_ENDINGS
 from naisr_viewer.state.explorer import ExplorerState, opened, showing, with_patient, without_patient
-from naisr_viewer.state.patients import Fitted, Labels, Patient, Reading, Scan
-from naisr_viewer.views.dialogs import files, label
+from naisr_viewer.state.patients import Fitted, OpenScan, Reading, Scan
 from naisr_viewer.views.patients import panel as pp
 from naisr_viewer.views.patients.known import NumberField
 from naisr_viewer.views.patients.list import AVERAGE
 from naisr_viewer.views.patients.pieces import ChoiceBox
-from naisr_viewer.words.numbers import gained, volume
-from naisr_viewer.words.patients import UNITS, breakable, interval, sentence
+from naisr_viewer.words.patients import UNITS
 
 LEFT = Qt.MouseButton.LeftButton
 
@@ -45,8 +41,8 @@ FIT = Fitted(
     seconds=2.31,
     remarks=("the shape does not tell sex: both levels explain it",),
 )
-ONE = Patient(1, "p01.stl", Reading(Path("/scans/p01.stl")), scan(volume_cm3=46.21))
-TWO = Patient(2, "p02.ply", Reading(Path("/scans/p02.ply")), scan(source="p02.ply, 800 faces"))
+ONE = OpenScan(1, "p01.stl", Reading(Path("/scans/p01.stl")), scan(volume_cm3=46.21))
+TWO = OpenScan(2, "p02.ply", Reading(Path("/scans/p02.ply")), scan(source="p02.ply, 800 faces"))
 
 
 @pytest.fixture
@@ -118,32 +114,6 @@ def write(box: NumberField, text: str) -> None:
     QTest.mouseClick(box.lineEdit(), LEFT)
     box.selectAll()
     QTest.keyClicks(box, text)
-
-
-# --- words --------------------------------------------------------------------------------------
-
-
-def test_figures_have_digits_that_mean_something(card):
-    assert volume(48.31, 2.13) == "48.3 ± 2.1 cm³"
-    assert volume(48.31, 0.0213) == "48.310 ± 0.021 cm³"
-    assert volume(62410.3, 1234.0) == "62,400 ± 1,200 cm³"
-    assert volume(48.31, 0.0) == volume(48.31) == "48.3 cm³"
-    assert volume(62410.3) == "62,410 cm³"
-    assert gained(61.0, 48.3) == "+12.7 cm³ (+26 %)"
-    assert gained(48.3, 61.0) == "−12.7 cm³ (−21 %)"
-    age, weight, sex = card.covariates
-    assert interval(age, 71.2, 96.8) == "95 %: 71 to 97 months"
-    assert interval(weight, 18.23, 24.91) == "95 %: 18.2 to 24.9 kg"
-    assert interval(sex, -1, 1) == "inferred; F or M"
-    assert interval(sex, 1, 1) == "inferred"
-
-
-def test_a_long_name_can_be_broken_and_a_sentence_begins_with_a_capital():
-    name = "a_segmentation_that_somebody_named_at_length.nii.gz"
-    assert breakable(f"{name}, label 2").replace("\u200b", "") == f"{name}, label 2"
-    assert "\u200b" in breakable(name)
-    assert sentence("the surface is open") == "The surface is open"
-    assert sentence("p01.stl: all is well") == "p01.stl: all is well"
 
 
 # --- the list -----------------------------------------------------------------------------------
@@ -478,36 +448,3 @@ def test_nothing_is_cut_off_on_the_right(panel, start):
     patient = replace(ONE, name=name, scan=scan(source=f"{name}, label 2", notes=notes), fit=FIT)
     panel.show_state(with_patient(start, patient))
     assert panel.list.parentWidget().minimumSizeHint().width() <= pp.PANEL_WIDTH - 12
-
-
-# --- dialogs ------------------------------------------------------------------------------------
-
-
-def test_every_ending_that_the_model_reads_can_be_chosen(panel, monkeypatch):
-    readable = meshes.READERS | POINT_ENDINGS | set(volumes.ENDINGS)
-    assert {f".{ending}" for ending in files.SCAN_ENDINGS} == readable
-    offered: list[str] = []
-
-    def answer(_parent: QWidget, _title: str, _folder: str, filters: str) -> tuple[str, str]:
-        offered.append(filters)
-        return "/scans/p01.stl", filters
-
-    monkeypatch.setattr(QFileDialog, "getOpenFileName", answer)
-    assert files.ask_scan_path(panel) == Path("/scans/p01.stl")
-    assert all(f"*{ending}" in offered[0] for ending in readable)
-
-
-def test_a_label_is_chosen_by_its_title(panel):
-    labels = Labels(Reading(Path("/scans/p01.nii.gz")), ((1, "1: 3.2 cm³"), (4, "4 'airway': 41.9 cm³")))
-
-    def answer(key: Qt.Key) -> None:
-        dialog = QApplication.activeModalWidget()
-        assert isinstance(dialog, label.LabelDialog)
-        assert "p01.nii.gz holds 2 labels" in words(dialog)
-        QTest.keyClick(dialog.choice, Qt.Key.Key_Down)
-        QTest.keyClick(dialog, key)
-
-    QTimer.singleShot(0, lambda: answer(Qt.Key.Key_Return))
-    assert label.ask_label(panel, labels) == 4
-    QTimer.singleShot(0, lambda: answer(Qt.Key.Key_Escape))
-    assert label.ask_label(panel, labels) is None

@@ -12,7 +12,7 @@ import pytest
 from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QTimer, QUrl
 from PySide6.QtGui import QAction, QDropEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QFileDialog, QPushButton, QWidget
+from PySide6.QtWidgets import QApplication, QFileDialog, QMenu, QPushButton, QWidget
 from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
 
 from naisr_viewer.state.explorer import FULL_SHAPE, Layout, Panel
@@ -152,6 +152,10 @@ def test_undo_and_reset_by_keyboard(ready, qtbot):
     assert window.covariates.rows["age"].spin.value() == 100.0
     press_keys(window, "Ctrl+Shift+Z")
     assert controller.state.values == changed
+    qtbot.waitUntil(window.isActiveWindow)  # only then it hears keys
+    for keys, values in ((Qt.Key.Key_Z, (100.0, 35.0, 0.0)), (Qt.Key.Key_Y, changed)):
+        QTest.keyClick(window, keys, Qt.KeyboardModifier.ControlModifier)
+        assert controller.state.values == values
     press_keys(window, "Ctrl+R")
     assert controller.state.values == (100.0, 35.0, 0.0)
     wait_idle(qtbot, controller)
@@ -179,7 +183,8 @@ def test_a_dropped_file_is_opened_and_remembered(open_window, qtbot, atlas_file)
     window.dropEvent(QDropEvent(QPointF(500, 300), copy, data, button, keys))
     qtbot.waitUntil(lambda: FULL_SHAPE in controller.shown, timeout=10_000)
     assert window.windowTitle().startswith("ellipsoid")
-    assert atlas_file.name in window._recent.actions()[0].text()
+    (recent,) = [menu for menu in window.findChildren(QMenu) if menu.title() == "Open recent"]
+    assert atlas_file.name in recent.actions()[0].text()
     wait_idle(qtbot, controller)
 
 
@@ -252,24 +257,28 @@ def test_windows_open_and_close_without_leaving_anything(open_window, qtbot, atl
     before_window = vtkOutputWindow.GetInstance()
     vtkOutputWindow.SetInstance(warnings)
     threads = threading.active_count()
+    closed: list[bool] = []
     try:
         for _ in range(10):
             pair = [open_window((800, 600)), open_window((800, 600))]
             for _window, controller in pair:
                 controller.open(atlas_file)
             qtbot.waitUntil(lambda pair=pair: all(c.shown for _, c in pair), timeout=10_000)
-            canvases = [window.shapes.canvas for window, _ in pair]
+            for window, _ in pair:
+                assert window.shapes.canvas is not None
+                window.shapes.canvas.destroyed.connect(lambda: closed.append(True))
             for window, _ in pair:  # in the middle of the exact surfaces
                 window.close()
             assert threading.active_count() == threads
             assert atlas.running == 0
-            assert all(canvas._closed for canvas in canvases)
-            assert not any(window.shapes.is_ready for window, _ in pair)
+            assert not any(window.shapes.is_ready or window.shapes.canvas for window, _ in pair)
             active = [
                 t for window, c in pair for t in (*window.findChildren(QTimer), *c.findChildren(QTimer))
             ]
             assert not [timer for timer in active if timer.isActive()]
             QTest.qWait(10)
+            assert len(closed) == 2
+            closed.clear()
     finally:
         vtkOutputWindow.SetInstance(before_window)
     gc.collect()
