@@ -12,7 +12,7 @@ from PySide6.QtCore import QObject, Qt, SignalInstance
 from PySide6.QtGui import QAction, QActionGroup, QKeySequence
 from PySide6.QtWidgets import QMenu, QToolBar, QWidget
 
-from naisr_viewer.state.explorer import OF_A_PATIENT, Layout
+from naisr_viewer.state.explorer import OF_A_PATIENT, ExplorerState, Layout
 from naisr_viewer.state.theme import ThemeChoice
 from naisr_viewer.views.covariates.panel import CovariatePanel
 from naisr_viewer.views.shapes.camera import DIRECTIONS
@@ -281,7 +281,19 @@ def make_toolbar(actions: Mapping[str, QAction], parent: QWidget) -> QToolBar:
     return bar
 
 
-def enable(commands: Sequence[Command], actions: Mapping[str, QAction], facts: AbstractSet[Fact]) -> None:
+def facts(state: ExplorerState, is_at_rest: bool, can_undo: bool, can_redo: bool) -> set[Fact]:
+    """What is so, of all that commands may need."""
+    holds = {
+        Fact.ATLAS: state.atlas is not None,
+        Fact.REST: is_at_rest,
+        Fact.FIT: state.fit is not None,
+        Fact.PAST: can_undo,
+        Fact.FUTURE: can_redo,
+    }
+    return {fact for fact, is_so in holds.items() if is_so}
+
+
+def enable(commands: Sequence[Command], actions: Mapping[str, QAction], so: AbstractSet[Fact]) -> None:
     """Enable the commands whose needs are met by what is so."""
     for command in commands:
-        actions[command.name].setEnabled(command.needs <= facts)
+        actions[command.name].setEnabled(command.needs <= so)

@@ -12,7 +12,16 @@ from PySide6.QtWidgets import QApplication, QHBoxLayout, QMainWindow, QWidget
 from naisr_viewer.state.explorer import ExplorerState, visible_panels
 from naisr_viewer.state.patients import Labels
 from naisr_viewer.state.theme import ThemeChoice
-from naisr_viewer.views.actions import COMMANDS, MENUS, RECENT, Fact, enable, fill, make_actions, make_toolbar
+from naisr_viewer.views.actions import (
+    COMMANDS,
+    MENUS,
+    RECENT,
+    enable,
+    facts,
+    fill,
+    make_actions,
+    make_toolbar,
+)
 from naisr_viewer.views.centre import Centre
 from naisr_viewer.views.covariates.panel import CovariatePanel
 from naisr_viewer.views.dialogs.about import about
@@ -152,14 +161,8 @@ class MainWindow(QMainWindow):
 
     def _enable(self) -> None:
         """Enable the commands that make sense."""
-        holds = {
-            Fact.ATLAS: self._state.atlas is not None,
-            Fact.REST: self._is_editable,
-            Fact.FIT: self._state.fit is not None,
-            Fact.PAST: self._can_undo,
-            Fact.FUTURE: self._can_redo,
-        }
-        enable(COMMANDS, self._actions, {fact for fact, is_so in holds.items() if is_so})
+        so = facts(self._state, self._is_editable, self._can_undo, self._can_redo)
+        enable(COMMANDS, self._actions, so)
 
     def ask_atlas(self) -> None:
         """Let an atlas be chosen and opened."""

@@ -33,11 +33,11 @@ class Canvas(QtInteractor):
     """
 
     drawn = Signal(int)  # the picture is on its way to the screen; how many sub-plots were drawn anew
-    held = Signal(bool)  # whether the mouse holds the shapes
 
     def __init__(self, colours: Sequence[str], parent: QWidget) -> None:
         self._plots: list[SubPlot] = []
         self._ghost_colour = "#000000"
+        self._is_moving = self._is_held = False
         super().__init__(
             parent, shape=(1, len(colours)), border=False, auto_update=False, multi_samples=REST_SAMPLES
         )
@@ -107,12 +107,10 @@ class Canvas(QtInteractor):
                 plot.renderer.SetViewport(*viewport)
         self.refresh()
 
-    def set_smooth(self, smooth: bool) -> None:
-        """Draw quickly while something moves, smoothly at rest."""
-        samples = REST_SAMPLES if smooth else 0
-        if self.ren_win.GetMultiSamples() != samples:
-            self.ren_win.SetMultiSamples(samples)
-            self.refresh()
+    def set_moving(self, moving: bool) -> None:
+        """Draw quickly while the surfaces move, smoothly at rest."""
+        self._is_moving = moving
+        self._choose_quality()
 
     def look(self, direction: Direction, up: Direction) -> None:
         """Stand in this direction from the middle."""
@@ -159,14 +157,14 @@ class Canvas(QtInteractor):
         self.drawn.emit(len(stale))
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        """Tell that the mouse holds the shapes."""
+        """Draw quickly while the mouse holds the shapes."""
         super().mousePressEvent(event)
-        self.held.emit(True)
+        self._set_held(True)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        """Tell that the mouse let go of the shapes."""
+        """Draw smoothly again when the mouse lets go of the shapes."""
         super().mouseReleaseEvent(event)
-        self.held.emit(False)
+        self._set_held(False)
 
     def release(self) -> None:
         """Close the render window for good; nothing is drawn afterwards."""
@@ -174,6 +172,16 @@ class Canvas(QtInteractor):
         self.close()
         self._forget_context()  # Qt deletes context and surface; Python must not know them any longer
         self.deleteLater()
+
+    def _set_held(self, held: bool) -> None:
+        self._is_held = held
+        self._choose_quality()
+
+    def _choose_quality(self) -> None:
+        samples = 0 if self._is_moving or self._is_held else REST_SAMPLES
+        if self.ren_win.GetMultiSamples() != samples:
+            self.ren_win.SetMultiSamples(samples)
+            self.refresh()
 
     def _render_requested(self, _interactor: object, _event: str) -> None:
         """The mouse moved the camera."""

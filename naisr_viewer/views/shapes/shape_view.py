@@ -57,7 +57,7 @@ class ShapeView(QWidget):
         self._ghost: tuple[NDArray[np.float32] | None, NDArray[np.int64]] = (None, NO_FACES)
         self._direction = OBLIQUE
         self._framed = False
-        self._moving = self._held = False
+        self._moving = False
         self._seen_mm = (1.0, 1.5)
         self._fit_scale = 1.0
         self._drawn_height = 1
@@ -144,7 +144,8 @@ class ShapeView(QWidget):
     def set_moving(self, moving: bool) -> None:
         """Draw quickly while a slider moves, smoothly at rest."""
         self._moving = moving
-        self._choose_quality()
+        if self._canvas is not None:
+            self._canvas.set_moving(moving)
 
     def set_theme(self, theme: Theme) -> None:
         """Follow the theme."""
@@ -189,13 +190,12 @@ class ShapeView(QWidget):
         colours = [panel_colour(self._atlas, panel) for panel in self._grid.cells]
         self._canvas = make_canvas(colours, self)
         self._canvas.drawn.connect(self._tell_drawn)
-        self._canvas.held.connect(self._set_held)
         self._area.addWidget(self._canvas)
         self._canvas.show()  # the layout would only do so with the next turn of the event loop
         self._canvas.look(*self._direction)
-        self._framed, self._held = False, False
+        self._framed = False
         self.set_theme(self._theme)
-        self._choose_quality()
+        self._canvas.set_moving(self._moving)
         for index, cell in enumerate(self._grid.cells.values()):
             if cell.result is not None:
                 self._canvas.set_surface(index, cell.result)
@@ -214,14 +214,6 @@ class ShapeView(QWidget):
         if not self._framed and canvas.box_mm() is not None:
             self.reset_camera()
             self._framed = all(self._grid.cells[panel].has_surface for panel in self._visible)
-
-    def _choose_quality(self) -> None:
-        if self._canvas is not None:
-            self._canvas.set_smooth(not self._moving and not self._held)
-
-    def _set_held(self, held: bool) -> None:
-        self._held = held
-        self._choose_quality()
 
     def _arrange(self) -> None:
         """Divide the canvas among the visible panels, keeping the user's zoom."""

@@ -9,7 +9,7 @@ import pytest
 from PySide6.QtGui import QKeySequence
 from PySide6.QtWidgets import QMenu, QWidget
 
-from naisr_viewer.state.explorer import Layout
+from naisr_viewer.state.explorer import ExplorerState, Layout, opened
 from naisr_viewer.state.theme import ThemeChoice
 from naisr_viewer.views import actions as va
 from naisr_viewer.views.actions import COMMANDS, MENUS, RECENT, SEPARATOR, TOOLBAR, Command, Fact
@@ -59,6 +59,19 @@ def test_commands_are_enabled_by_what_is_so(parent, facts, enabled, disabled):
     va.enable(COMMANDS, made, facts)
     assert [name for name in enabled if not made[name].isEnabled()] == []
     assert [name for name in disabled if made[name].isEnabled()] == []
+
+
+def test_facts_are_those_of_the_state(card):
+    def of(state: ExplorerState) -> set[Fact]:
+        return va.facts(state, is_at_rest=False, can_undo=False, can_redo=False)
+
+    assert of(ExplorerState()) == set()
+    assert of(opened(ExplorerState(), card)) == {Fact.ATLAS}
+    assert va.facts(ExplorerState(), is_at_rest=True, can_undo=True, can_redo=True) == {
+        Fact.REST,
+        Fact.PAST,
+        Fact.FUTURE,
+    }
 
 
 def test_a_command_acts_on_the_window_it_was_made_for(parent):

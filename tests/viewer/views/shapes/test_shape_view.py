@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 import pytest
@@ -38,6 +39,8 @@ from naisr_viewer.views.shapes.arrangement import CAPTION_PX
 from naisr_viewer.views.shapes.colour_bar import ColourBar
 from naisr_viewer.views.shapes.drawing import DRAWING
 from naisr_viewer.views.theme import DARK, LIGHT
+
+W = TypeVar("W", bound=QWidget)
 
 Surfaces = dict[Panel, SurfaceResult]
 
@@ -110,7 +113,7 @@ def pixels(view: sv.ShapeView) -> np.ndarray:
     return flat[:, : image.width(), 2::-1].copy()
 
 
-def beneath(view: sv.ShapeView, panel: Panel, kind: type[QWidget], name: str = "") -> QWidget | None:
+def beneath(view: sv.ShapeView, panel: Panel, kind: type[W], name: str = "") -> W | None:
     """What of this kind stands under the title of a sub-plot that is on screen; None without any."""
     title = view.title(panel).geometry()
     below = [
@@ -127,12 +130,6 @@ def caption(view: sv.ShapeView, panel: Panel) -> QWidget:
     found = beneath(view, panel, QLabel, "caption")
     assert found is not None
     return found
-
-
-def bar_of(view: sv.ShapeView, panel: Panel) -> ColourBar | None:
-    bar = beneath(view, panel, ColourBar)
-    assert bar is None or isinstance(bar, ColourBar)
-    return bar
 
 
 def mesh_in(view: sv.ShapeView, panel: Panel):
@@ -416,9 +413,9 @@ def test_a_colour_bar_stands_between_shape_and_caption(views, card):
     with_bar = set()
     for panels in (all_panels(card), (BEFORE, FULL_SHAPE, CHANGE), (FULL_SHAPE, SCAN, CERTAINTY)):
         views.show_panels(panels)
-        with_bar |= {panel for panel in panels if bar_of(views, panel) is not None}
+        with_bar |= {panel for panel in panels if beneath(views, panel, ColourBar) is not None}
     assert with_bar == {SCAN, CERTAINTY, CHANGE}
-    bar, shape, below = bar_of(views, SCAN), inside(views, SCAN)[0], caption(views, SCAN)
+    bar, shape, below = beneath(views, SCAN, ColourBar), inside(views, SCAN)[0], caption(views, SCAN)
     assert bar is not None
     place = bar.geometry()
     text_top = below.geometry().top() + below.contentsMargins().top()
@@ -431,7 +428,7 @@ def test_a_colour_bar_stands_between_shape_and_caption(views, card):
 
 def test_the_bar_keeps_its_numbers_while_a_preview_is_plain(views, surfaces):
     views.show_panels((BEFORE, FULL_SHAPE, CHANGE))
-    bar = bar_of(views, CHANGE)
+    bar = beneath(views, CHANGE, ColourBar)
     assert bar is not None
     assert bar.limit_mm is None
     views.show_surface(of(surfaces, CHANGE, 1.0, limit_mm=5.0))
