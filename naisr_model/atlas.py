@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from threadpoolctl import threadpool_limits
 from torch import Tensor
 
+from naisr_model.capabilities import Capabilities
 from naisr_model.checkpoint import Checkpoint, load
 from naisr_model.covariates import Covariate, Population, Values, complete, normalised_vector
 from naisr_model.errors import InputError
@@ -40,7 +41,7 @@ from naisr_model.learning.fitting.posterior import (
 from naisr_model.learning.fitting.prior import Prior, prior_of
 from naisr_model.learning.fitting.search import fit_shape
 from naisr_model.learning.fitting.target import draw_sample, target_of
-from naisr_model.models.base import Capabilities, ShapeModel, additive, deformable
+from naisr_model.models.base import ShapeModel, additive, deformable
 from naisr_model.models.devices import usable_device
 from naisr_model.progress import SILENT, Progress
 from naisr_model.surface.displacements import Displacements, DisplacementTables, tabulate

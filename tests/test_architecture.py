@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[1]
 FLOORS = {
     "naisr_model": (
         ("__init__",),
-        ("errors", "files", "shipped", "covariates", "frames", "config", "progress"),
+        ("errors", "files", "shipped", "covariates", "frames", "config", "progress", "capabilities"),
         ("work",),
         ("data",),
         ("models",),
@@ -60,12 +60,15 @@ class Rule:
 
 
 COVARIATES = "naisr_model.covariates"
-LIGHT = tuple(f"naisr_model.{name}" for name in ("errors", "files", "shipped"))
+VOCABULARY = (COVARIATES, "naisr_model.capabilities")
+LIGHT = tuple(f"naisr_model.{name}" for name in ("errors", "files", "progress", "shipped"))
 """What anybody may use."""
 
 CANVAS = "naisr_viewer.views.shapes.canvas"
 NO_QT = tuple(f"naisr_viewer.{room}*" for room in ("state", "words", "engine", "panels", "files"))
-SPEAKS_OF_COVARIATES = tuple(f"naisr_viewer.{room}*" for room in ("state", "words", "panels", "views"))
+SPEAKS_OF_COVARIATES = tuple(
+    f"naisr_viewer.{room}*" for room in ("state", "words", "panels", "files", "views")
+)
 GROUND = ("naisr_model", *(f"naisr_model.{name}" for name in FLOORS["naisr_model"][1]))
 
 RULES = (
@@ -77,7 +80,7 @@ RULES = (
         allowed=LIGHT,
         but_not=("naisr_viewer.engine*", *SPEAKS_OF_COVARIATES),
     ),
-    Rule(SPEAKS_OF_COVARIATES, ("naisr_model",), allowed=(*LIGHT, COVARIATES)),
+    Rule(SPEAKS_OF_COVARIATES, ("naisr_model",), allowed=(*LIGHT, *VOCABULARY)),
     Rule(("naisr_viewer*",), ("torch",)),
     Rule(("naisr_viewer*",), ("pyvistaqt",), but_not=(CANVAS,)),
     Rule(NO_QT, QT),

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import ClassVar, NamedTuple, final
 
 import numpy as np
@@ -20,43 +19,13 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor, nn
 
+from naisr_model.capabilities import Capabilities
 from naisr_model.config import NetworkConfig
 from naisr_model.covariates import Population
 from naisr_model.errors import InputError
 
 PointFunction = Callable[[Tensor], Tensor]
 """Of points ``[n, dim]`` in model units, on the device and in the precision of the model."""
-
-
-@dataclass(frozen=True)
-class Capabilities:
-    """What a model can do, in the terms of Table 1 of Jiao et al. (ICLR 2024), and two facts about it.
-
-    Attributes:
-        implicit: a shape is the zero level set of a field that is defined everywhere.
-        deformable: that field is a template's at points that were moved, so that shapes correspond.
-        disentangleable: the shape of one covariate alone can be shown.
-        evolvable: shapes depend on covariates and can be followed along them.
-        transferable: a person's shape is known at other covariates than those at which it was seen.
-        invertible: p -> p + d(p) cannot fold.
-        has_template: there is a shape T that all others are deformed from.
-        vanishes_at_centre: nothing is displaced where all covariates are at their centre, whatever the
-            code is: g_i(p, 0, z) = 0, and the shape there is the template.
-    """
-
-    implicit: bool = True
-    deformable: bool = False
-    disentangleable: bool = False
-    evolvable: bool = False
-    transferable: bool = False
-    invertible: bool = False
-    has_template: bool = False
-    vanishes_at_centre: bool = False
-
-    @property
-    def trackable(self) -> bool:
-        """Whether the template's surface can be carried to a shape from tables of displacements."""
-        return self.deformable and self.disentangleable and self.vanishes_at_centre
 
 
 class Linearised(NamedTuple):

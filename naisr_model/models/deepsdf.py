@@ -14,8 +14,9 @@ from typing import ClassVar, final
 import torch
 from torch import Tensor, nn
 
+from naisr_model.capabilities import Capabilities
 from naisr_model.config import LossWeights, NetworkConfig, Preset, SirenConfig, TrainingConfig
-from naisr_model.models.base import Capabilities, Linearised, PointFunction, ShapeModel
+from naisr_model.models.base import Linearised, PointFunction, ShapeModel
 from naisr_model.models.siren import SirenStack
 
 

@@ -17,8 +17,9 @@ from typing import ClassVar, final
 import torch
 from torch import Tensor, nn
 
+from naisr_model.capabilities import Capabilities
 from naisr_model.config import NetworkConfig, SirenConfig
-from naisr_model.models.base import AdditiveModel, Capabilities, Linearised, PointFunction
+from naisr_model.models.base import AdditiveModel, Linearised, PointFunction
 from naisr_model.models.naisr import calculus, inference
 from naisr_model.models.siren import SirenStack
 

@@ -1,0 +1,36 @@
+"""What a shape model can do: known without the model, so that others may ask."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Capabilities:
+    """What a model can do, in the terms of Table 1 of Jiao et al. (ICLR 2024), and two facts about it.
+
+    Attributes:
+        implicit: a shape is the zero level set of a field that is defined everywhere.
+        deformable: that field is a template's at points that were moved, so that shapes correspond.
+        disentangleable: the shape of one covariate alone can be shown.
+        evolvable: shapes depend on covariates and can be followed along them.
+        transferable: a person's shape is known at other covariates than those at which it was seen.
+        invertible: p -> p + d(p) cannot fold.
+        has_template: there is a shape T that all others are deformed from.
+        vanishes_at_centre: nothing is displaced where all covariates are at their centre, whatever the
+            code is: g_i(p, 0, z) = 0, and the shape there is the template.
+    """
+
+    implicit: bool = True
+    deformable: bool = False
+    disentangleable: bool = False
+    evolvable: bool = False
+    transferable: bool = False
+    invertible: bool = False
+    has_template: bool = False
+    vanishes_at_centre: bool = False
+
+    @property
+    def trackable(self) -> bool:
+        """Whether the template's surface can be carried to a shape from tables of displacements."""
+        return self.deformable and self.disentangleable and self.vanishes_at_centre
