@@ -1,4 +1,4 @@
-"""Where the atlas is that comes with the program."""
+"""Where the files are that come with the program."""
 
 from __future__ import annotations
 
@@ -11,14 +11,22 @@ _PLACES = (_ROOT / "resources", _ROOT / "naisr_viewer" / "_resources")
 """In a checkout, and in an installation."""
 
 
+def shipped(name: str) -> Path:
+    """A file or folder that comes with the program, as ``docs/glossary.md``.
+
+    Raises:
+        InputError: when it was not installed.
+    """
+    found = next((place / name for place in _PLACES if (place / name).exists()), None)
+    if found is None:
+        raise InputError(f"{name}, which comes with the program, is not installed; install it again")
+    return found
+
+
 def shipped_atlas() -> Path:
     """The airway atlas that comes with the program.
 
     Raises:
         InputError: when it was not installed.
     """
-    files = [place / "airway.safetensors" for place in _PLACES]
-    found = next((file for file in files if file.is_file()), None)
-    if found is None:
-        raise InputError("the shipped airway atlas is not installed; give the path of an atlas")
-    return found
+    return shipped("airway.safetensors")

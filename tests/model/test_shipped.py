@@ -90,13 +90,13 @@ def test_patients_are_held_out_whole(atlas):
 
 
 def test_the_band_misses_nothing_of_a_real_atlas(atlas):
-    network, lattice, rng = atlas.checkpoint.network(), Lattice(64), np.random.default_rng(0)
+    model, lattice, rng = atlas.checkpoint.model(), Lattice(64), np.random.default_rng(0)
     low, high = np.array([covariate.range for covariate in atlas.covariates]).T
     for _ in range(3):
         values = dict(zip(atlas.population.names, rng.uniform(low, high), strict=True))
         vector = torch.as_tensor(normalised_vector(atlas.covariates, values), dtype=torch.float32)
         latent = torch.as_tensor(atlas.checkpoint.latents[rng.integers(len(atlas.checkpoint.latents))])
-        field = shape_field(network, vector, latent)
+        field = shape_field(model, vector, latent)
         dense = isosurface(evaluate_everywhere(field, lattice), lattice, atlas.frame)
         banded = isosurface(evaluate_band(field, lattice), lattice, atlas.frame)
         assert (dense.faces == banded.faces).all()
