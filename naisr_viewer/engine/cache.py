@@ -1,11 +1,13 @@
 """What is kept between two runs of the program: nothing of it is needed, all of it saves time.
 
 Everything is kept under a fingerprint of the atlas file and of the program, so that another file, or
-another version of the program, finds nothing and computes.
+another version of the program, finds nothing and computes. A cache that fails costs time, no more.
 """
 
 from __future__ import annotations
 
+import contextlib
+import dataclasses
 import hashlib
 import json
 import zipfile
@@ -13,15 +15,23 @@ import zlib
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import platformdirs
 
 import naisr_viewer
 from naisr_model import errors
+from naisr_model.capabilities import Capabilities
+from naisr_model.covariates import Population
 from naisr_model.errors import InputError
-from naisr_viewer.state.explorer import AtlasCard, Population
-from naisr_viewer.state.requests import Origin, SurfaceRequest, SurfaceResult
+from naisr_model.files import replacing
+from naisr_viewer.state.atlas_card import AtlasCard
+from naisr_viewer.state.layouts import FULL_SHAPE, TEMPLATE
+from naisr_viewer.state.requests import EXACT_RESOLUTION, Origin, SurfaceRequest, SurfaceResult
+
+if TYPE_CHECKING:
+    from naisr_model.surface.displacements import DisplacementTables
 
 KEPT_FILES = 8
 """How many of each kind are kept, the newest ones; some MB each."""
@@ -39,7 +49,7 @@ def cache_folder() -> Path:
     return platformdirs.user_cache_path("naisr-viewer", appauthor=False)
 
 
-def fingerprint(path: Path) -> str:
+def fingerprint_of(path: Path) -> str:
     """Of the contents of an atlas file and of the program.
 
     Raises:
@@ -49,11 +59,12 @@ def fingerprint(path: Path) -> str:
         contents = path.read_bytes()
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror}; give the path of an atlas") from error
-    return hashlib.sha256(_program_digest() + contents).hexdigest()[:32]
+    return hashlib.sha256(program_digest() + contents).hexdigest()[:32]
 
 
 @lru_cache(maxsize=1)
-def _program_digest() -> bytes:
+def program_digest() -> bytes:
+    """Of the code that computes surfaces."""
     sources = sorted(file for folder in PROGRAM for file in folder.rglob("*.py"))
     return hashlib.sha256(b"".join(file.read_bytes() for file in sources)).digest()
 
@@ -64,41 +75,88 @@ class Opening:
 
     Attributes:
         card: of the atlas.
-        template: its exact surface, which every sub-plot shows while all covariates are at their centre.
+        picture: the answer to :func:`first_picture`.
     """
 
     card: AtlasCard
-    template: SurfaceResult
+    picture: SurfaceResult
 
 
-def write_opening(file: Path, opening: Opening) -> None:
-    """Write what :func:`read_opening` reads.
+def first_picture(atlas: AtlasCard) -> SurfaceRequest:
+    """What every sub-plot shows while all covariates are at their centre, and all previews are made of."""
+    if atlas.capabilities.vanishes_at_centre:
+        return SurfaceRequest(atlas.path, TEMPLATE, (), EXACT_RESOLUTION)
+    centre = tuple((covariate.name, covariate.centre) for covariate in atlas.covariates)
+    return SurfaceRequest(atlas.path, FULL_SHAPE, centre, EXACT_RESOLUTION)
 
-    Raises:
-        OSError: when the file cannot be written.
+
+class Cache:
+    """Of one user.
+
+    Args:
+        folder: where it is; made when it is missing.
     """
-    card, template = opening.card, opening.template
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def opening(self, fingerprint: str, path: Path) -> Opening | None:
+        """Of the atlas file ``path``, or None where nothing of use is kept."""
+        with contextlib.suppress(InputError):
+            return _read_opening(self._file(fingerprint, OPENING), path)
+        return None
+
+    def keep_opening(self, fingerprint: str, opening: Opening) -> None:
+        """For the next run."""
+        with contextlib.suppress(OSError):
+            with replacing(self._file(fingerprint, OPENING)) as temporary:
+                _write_opening(temporary, opening)
+            self._forget_oldest(OPENING)
+
+    def tables(self, fingerprint: str) -> DisplacementTables | None:
+        """Tabulated displacements of the population average, or None where none of use are kept."""
+        from naisr_model.surface.displacements import DisplacementTables
+
+        with contextlib.suppress(InputError):
+            return DisplacementTables.load(self._file(fingerprint, DISPLACEMENTS))
+        return None
+
+    def keep_tables(self, fingerprint: str, tables: DisplacementTables) -> None:
+        """For the next run."""
+        with contextlib.suppress(OSError):
+            tables.save(self._file(fingerprint, DISPLACEMENTS))
+            self._forget_oldest(DISPLACEMENTS)
+
+    def _file(self, fingerprint: str, ending: str) -> Path:
+        return self._folder / f"{fingerprint}.{ending}"
+
+    def _forget_oldest(self, ending: str) -> None:
+        """Bound what is kept."""
+        kept = sorted(self._folder.glob(f"*.{ending}"), key=lambda file: file.stat().st_mtime)
+        for old in kept[:-KEPT_FILES]:
+            old.unlink(missing_ok=True)
+
+
+def _write_opening(file: Path, opening: Opening) -> None:
+    card, picture = opening.card, opening.picture
     record = {
         "name": card.name,
         "population": card.population.to_json(),
-        "volume_cm3": template.volume_cm3,
-        "seconds": template.seconds,
+        "capabilities": dataclasses.asdict(card.capabilities),
+        "volume_cm3": picture.volume_cm3,
+        "seconds": picture.seconds,
     }
     np.savez(
         file,
-        points_mm=template.points_mm,
-        normals=template.normals,
-        faces=template.faces,
+        points_mm=picture.points_mm,
+        normals=picture.normals,
+        faces=picture.faces,
         record=np.array(json.dumps(record)),
     )
 
 
-def read_opening(file: Path, request: SurfaceRequest) -> Opening:
-    """What :func:`write_opening` kept; the archive's checksums find out what was damaged since.
-
-    Args:
-        file: in the cache.
-        request: for the exact template of the atlas that is opened.
+def _read_opening(file: Path, atlas: Path) -> Opening:
+    """What :func:`_write_opening` kept; the archive's checksums find out what was damaged since.
 
     Raises:
         InputError: when there is no such file or it is damaged.
@@ -107,8 +165,10 @@ def read_opening(file: Path, request: SurfaceRequest) -> Opening:
         with file.open("rb") as handle, np.load(handle, allow_pickle=False) as arrays:
             record = json.loads(str(arrays["record"]))
             population = Population.from_json(record["population"])
-            template = SurfaceResult(
-                request=request,
+            capabilities = Capabilities(**record["capabilities"])
+            card = AtlasCard(atlas, str(record["name"]), population.covariates, population, capabilities)
+            picture = SurfaceResult(
+                request=first_picture(card),
                 points_mm=arrays["points_mm"],
                 normals=arrays["normals"],
                 faces=arrays["faces"],
@@ -118,16 +178,4 @@ def read_opening(file: Path, request: SurfaceRequest) -> Opening:
             )
     except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile, zlib.error) as error:
         raise InputError(f"{file} does not hold the opening of an atlas ({error})") from error
-    card = AtlasCard(request.atlas, str(record["name"]), population.covariates, population)
-    return Opening(card, template)
-
-
-def forget_oldest(folder: Path, ending: str) -> None:
-    """Bound what is kept.
-
-    Raises:
-        OSError: when a file cannot be removed.
-    """
-    kept = sorted(folder.glob(f"*.{ending}"), key=lambda file: file.stat().st_mtime)
-    for old in kept[:-KEPT_FILES]:
-        old.unlink(missing_ok=True)
+    return Opening(card, picture)

@@ -1,4 +1,4 @@
-"""Patients for the engine: files read and aligned, shapes fitted. Knows no Qt."""
+"""Patients for the engine: files read and aligned, shapes fitted."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
+from naisr_model.progress import SILENT, Progress
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.engine.members import Member
-from naisr_viewer.state.explorer import FULL_SHAPE
+from naisr_viewer.state.layouts import FULL_SHAPE
 from naisr_viewer.state.patients import Fitted, Labels, Named, Reading, Scan
-from naisr_viewer.state.requests import EXACT_RESOLUTION, Progress, ShouldStop, SurfaceRequest
+from naisr_viewer.state.requests import EXACT_RESOLUTION, SurfaceRequest
 
 if TYPE_CHECKING:
     from naisr_model.patients.intake import Intake
@@ -48,57 +49,45 @@ class Clinic:
         titles = intake.labels(reading.path) if reading.label is None else None
         return Labels(reading, tuple(titles.items())) if titles and len(titles) > 1 else None
 
-    def read(
-        self, atlas: Path, reading: Reading, known: Named, should_stop: ShouldStop | None = None
-    ) -> Scan:
+    def read(self, atlas: Path, reading: Reading, known: Named, progress: Progress = SILENT) -> Scan:
         """Read a patient's file as asked and bring it into the frame of an open atlas.
 
         Args:
             atlas: file of the open atlas.
             reading: what to read and how to align it.
             known: covariates; an alignment is to the atlas's shape at them.
-            should_stop: polled during an alignment.
+            progress: of an alignment.
 
         Raises:
             InputError: when the file cannot be used.
-            Cancelled: when ``should_stop()`` turned true.
+            Cancelled: when nobody waits any more.
         """
         from naisr_model.patients import intake
 
         model = self._engine.atlas(atlas)
         taken = intake.read(reading.path, model, reading.label, reading.scale)
         if reading.align != "none":
-            taken = intake.aligned(taken, model, dict(known), reading.align, reading.landmarks, should_stop)
+            taken = intake.aligned(taken, model, dict(known), reading.align, reading.landmarks, progress)
         scan = _scan(taken)
         self._intakes[scan] = taken
         return scan
 
-    def fit(
-        self,
-        atlas: Path,
-        scan: Scan,
-        known: Named,
-        progress: Progress,
-        should_stop: ShouldStop | None = None,
-    ) -> Fitted:
+    def fit(self, atlas: Path, scan: Scan, known: Named, progress: Progress = SILENT) -> Fitted:
         """Fit an open atlas to a patient that :meth:`read` has read; the engine then knows the person.
 
         Raises:
             InputError: when the shape cannot be fitted.
-            Cancelled: when ``should_stop()`` turned true.
+            Cancelled: when nobody waits any more.
         """
         model, patient = self._engine.atlas(atlas), self._intakes[scan].patient
         shape = patient.mesh_mm.vertices if patient.is_cloud else patient.mesh_mm
-        fit = model.fit(
-            shape, dict(known), progress=lambda share: progress(FIT_SHARE * share), should_stop=should_stop
-        )
+        fit = model.fit(shape, dict(known), progress=progress.part(0.0, FIT_SHARE))
         values = tuple(fit.covariates.items())
         person = self._engine.admit(Member(atlas, fit, scan))
         try:
             surface = self._engine.surface(
                 SurfaceRequest(atlas, FULL_SHAPE, values, EXACT_RESOLUTION, person),
-                lambda share: progress(FIT_SHARE + (1 - FIT_SHARE) * share),
-                should_stop,
+                progress.part(FIT_SHARE, 1.0),
             )
         except BaseException:
             self._engine.dismiss(person)
@@ -110,7 +99,7 @@ class Clinic:
             volume_cm3=surface.volume_cm3,
             volume_margin_cm3=surface.volume_margin_cm3,
             residual_mm=fit.residual_mm,
-            lasting=fit.lasting,
+            lasting=fit.lasting if model.capabilities.transferable else None,
             seconds=fit.seconds,
             remarks=fit.remarks,
         )

@@ -1,4 +1,4 @@
-"""Whose previews are fast, and where each of them was left. Knows no Qt."""
+"""Whose previews are fast, and where each of them was left."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from threading import Lock
 from typing import TYPE_CHECKING
 
 from naisr_viewer.engine import surfaces
-from naisr_viewer.state.explorer import Panel
+from naisr_viewer.state.layouts import Panel
 from naisr_viewer.state.patients import Named
 from naisr_viewer.state.requests import SurfaceRequest, SurfaceResult
 
@@ -54,17 +54,11 @@ class Previews:
             for panel_key in [key for key in self._tracked if is_meant(*key[:2])]:
                 del self._tracked[panel_key]
 
-    def surface(self, request: SurfaceRequest, question: SurfaceRequest, tracker: Tracker) -> SurfaceResult:
-        """The preview that answers ``request``.
-
-        Args:
-            request: says which sub-plot it is for.
-            question: the simplest request with the same surface.
-            tracker: of the person.
-        """
+    def surface(self, request: SurfaceRequest, tracker: Tracker) -> SurfaceResult:
+        """The preview that answers ``request``; equal requests in a row share one."""
         start, preview = time.perf_counter(), self._last
-        if preview is None or preview.request != question:
-            preview = surfaces.from_tracked(question, tracker, self.track(request, tracker), start)
+        if preview is None or preview.request != request:
+            preview = surfaces.from_tracked(request, tracker, self.track(request, tracker), start)
             self._last = preview
         return preview
 

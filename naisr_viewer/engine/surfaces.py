@@ -1,52 +1,21 @@
-"""What the networks, the tables and the scans give, as the results that the window draws. Knows no Qt."""
+"""What the networks and the tables give, as the results that the window draws."""
 
 from __future__ import annotations
 
+import math
 import time
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from naisr_viewer.engine import members
-from naisr_viewer.engine.members import Member
-from naisr_viewer.state.requests import (
-    EXACT_RESOLUTION,
-    Origin,
-    Progress,
-    ShouldStop,
-    SurfaceRequest,
-    SurfaceResult,
-)
+from naisr_viewer.state.requests import Origin, SurfaceRequest, SurfaceResult
 
 if TYPE_CHECKING:
     import trimesh
 
     from naisr_model.atlas import Atlas
     from naisr_model.surface.tracking import Tracked, Tracker
-
-
-def mesh(
-    atlas: Atlas,
-    request: SurfaceRequest,
-    latent: NDArray[np.float64] | None,
-    tracker: Tracker | None,
-    progress: Progress | None,
-    should_stop: ShouldStop | None,
-) -> trimesh.Trimesh:
-    """What the networks have at the values of ``request``; a tracker tells them where to look first."""
-    panel, size = request.panel, request.resolution
-    if panel.kind == "template":
-        return atlas.template(size, progress=progress, should_stop=should_stop)
-    if panel.kind == "effect":
-        ((name, value),) = request.values
-        return atlas.effect(
-            name, value, latent, size, tracker=tracker, progress=progress, should_stop=should_stop
-        )
-    return atlas.shape(
-        dict(request.values), latent, size, tracker=tracker, progress=progress, should_stop=should_stop
-    )
 
 
 def from_mesh(request: SurfaceRequest, mesh_mm: trimesh.Trimesh, start: float) -> SurfaceResult:
@@ -80,30 +49,6 @@ def from_tracked(request: SurfaceRequest, tracker: Tracker, tracked: Tracked, st
     )
 
 
-def from_scan(request: SurfaceRequest, member: Member) -> SurfaceResult:
-    """The scan, at rest with its distance to the shape."""
-    start, is_exact = time.perf_counter(), request.resolution >= EXACT_RESOLUTION
-    colouring = members.distances(member, request.values) if is_exact else None
-    scan = member.scan
-    return SurfaceResult(
-        request=request,
-        points_mm=scan.points_mm,
-        normals=scan.normals,
-        faces=scan.faces,
-        volume_cm3=scan.volume_cm3 or 0.0,
-        seconds=time.perf_counter() - start,
-        origin=Origin.NETWORK,
-        colouring=colouring,
-    )
-
-
-def with_certainty(shape: SurfaceResult, member: Member) -> SurfaceResult:
-    """A shape, at rest with how sure its surface is."""
-    if not shape.is_exact or not len(shape.faces):
-        return shape
-    return replace(shape, colouring=members.certainty(member, shape.request.values, shape.points_mm))
-
-
 def volume_cm3(points_mm: NDArray, normals: NDArray, faces: NDArray[np.int64]) -> float:
     """What a surface encloses: vertices and unit normals there ``[n, 3]``, triangles ``[m, 3]``."""
     from naisr_model.surface.volume import enclosed_volume
@@ -128,3 +73,17 @@ def at_nearest(
 
     result: NDArray[np.float32] = values[cKDTree(places).query(points)[1]]
     return result
+
+
+def limit_mm(atlas: Atlas, share: float) -> float:
+    """The end of a colour scale: a share of the atlas's unit of length, rounded to 1, 2 or 5.
+
+    The unit is about half of its largest shape. Ends never depend on a person, so people can be compared.
+    """
+    return rounded(share * atlas.frame.scale_mm)
+
+
+def rounded(length: float) -> float:
+    """The nearest of 1, 2, 5, 10, 20, 50 ... by ratio."""
+    decade = 10.0 ** math.floor(math.log10(length))
+    return min((step * decade for step in (1, 2, 5, 10)), key=lambda step: abs(math.log(step / length)))

@@ -84,7 +84,8 @@ class Fitted:
         volume_cm3: of the fitted shape.
         volume_margin_cm3: half of its 95 % interval; None where the shape is the template.
         residual_mm: mean distance of the scan to the fitted surface.
-        lasting: share of what sets the person apart that is kept at other covariates.
+        lasting: share of what sets the person apart that is kept at other covariates; None where the shape
+            model knows nobody at others.
         seconds: what the fit took.
         remarks: what the shape does not settle, a sentence each.
     """
@@ -95,13 +96,13 @@ class Fitted:
     volume_cm3: float
     volume_margin_cm3: float | None
     residual_mm: float
-    lasting: float
+    lasting: float | None
     seconds: float
     remarks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
-class Patient:
+class OpenScan:
     """One scan that is open.
 
     Attributes:

@@ -2,23 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum, auto
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from naisr_viewer.state.explorer import (
-    FULL_SHAPE,
-    TEMPLATE,
-    Covariate,
-    ExplorerState,
-    Panel,
-    panel_values,
-    visible_panels,
-)
+from naisr_viewer.state.layouts import Panel
 from naisr_viewer.state.patients import Named
 
 PREVIEW_RESOLUTION = 40
@@ -30,14 +22,8 @@ EXACT_RESOLUTION = 128
 FORMATS = ("stl", "ply", "obj", "vtp", "glb")
 """Mesh files that can be written."""
 
-HAS_TWO_SIDES = {"scan": True, "certainty": False, "change": True}
-"""Kinds of panels with numbers on their surface, and whether the scale of these has two sides."""
-
-Progress = Callable[[float], None]
-"""Told now and then which share of the work is done, 0 to 1."""
-
-ShouldStop = Callable[[], bool]
-"""Asked now and then whether nobody waits for the work any more."""
+Scale = Literal["signed", "unsigned"]
+"""Of numbers shown as colours: from minus to plus a limit, or from 0 to it."""
 
 
 class Origin(Enum):
@@ -45,6 +31,7 @@ class Origin(Enum):
 
     NETWORK = auto()  # the zero level set of the networks on a lattice
     TABLES = auto()  # the template's surface, carried by tabulated displacements
+    MEASURED = auto()  # a scan
 
 
 @dataclass(frozen=True)
@@ -73,14 +60,14 @@ class Colouring:
     """Values shown as colours on a surface, with a fixed scale, so that pictures can be compared.
 
     Attributes:
-        values_mm: one a vertex, float32 ``[n]``.
-        limit_mm: the end of the scale; values beyond it have its colour.
-        is_signed: whether the scale runs from ``-limit_mm`` to ``limit_mm``; else it begins at 0.
+        values: one a vertex in the unit of the kind of view, float32 ``[n]``.
+        limit: the end of the scale; values beyond it have its colour.
+        scale: from ``-limit`` to ``limit``, or from 0.
     """
 
-    values_mm: NDArray[np.float32]
-    limit_mm: float
-    is_signed: bool
+    values: NDArray[np.float32]
+    limit: float
+    scale: Scale
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,58 +106,7 @@ class SurfaceResult:
     @property
     def is_exact(self) -> bool:
         """Whether this is as fine as the window shows at rest."""
-        return self.origin is Origin.NETWORK and self.request.resolution >= EXACT_RESOLUTION
-
-
-def request_for(state: ExplorerState, panel: Panel, resolution: int) -> SurfaceRequest:
-    """The surface that ``panel`` shows in ``state``; there is an atlas."""
-    assert state.atlas is not None
-    person, before, reference = state.person, None, state.reference
-    if panel.kind == "template":
-        person = 0
-    if panel.kind == "before" and reference is not None:
-        person = reference.person
-    if panel.kind == "change" and reference is not None:
-        before = reference.person, reference.values
-    values = panel_values(state, panel)
-    return SurfaceRequest(state.atlas.path, panel, values, resolution, person, before)
-
-
-def template_request(atlas: Path) -> SurfaceRequest:
-    """The exact template, which all previews are made of."""
-    return SurfaceRequest(atlas, TEMPLATE, (), EXACT_RESOLUTION)
-
-
-def simplest(request: SurfaceRequest, covariates: tuple[Covariate, ...]) -> SurfaceRequest:
-    """The request with the fewest covariates that has the same surface as ``request``.
-
-    g_i vanishes where covariate i is at its centre, so Phi with a single covariate off its centre is
-    that covariate's Phi_i, and with none it is the template T, whoever it is.
-    """
-    if request.panel.kind in HAS_TWO_SIDES:
-        return request
-    centre = {covariate.name: covariate.centre for covariate in covariates}
-    moved = tuple((name, value) for name, value in request.values if value != centre[name])
-    if len(moved) > 1:
-        return replace(request, panel=FULL_SHAPE, values=moved)
-    if moved:
-        return replace(request, panel=Panel("effect", moved[0][0]), values=moved)
-    return replace(request, panel=TEMPLATE, values=(), person=0)
-
-
-def answers(result: SurfaceResult | None, request: SurfaceRequest) -> bool:
-    """Whether ``result`` shows what ``request`` asks for, at least as finely."""
-    if result is None or result.request.resolution < request.resolution:
-        return False
-    return replace(result.request, resolution=request.resolution) == request
-
-
-def missing(
-    state: ExplorerState, shown: Mapping[Panel, SurfaceResult], resolution: int
-) -> list[SurfaceRequest]:
-    """What ``state`` wants at ``resolution`` and is not among ``shown`` yet, the full shape first."""
-    wanted = [request_for(state, panel, resolution) for panel in reversed(visible_panels(state))]
-    return [request for request in wanted if not answers(shown.get(request.panel), request)]
+        return self.origin is not Origin.TABLES and self.request.resolution >= EXACT_RESOLUTION
 
 
 @dataclass(frozen=True)

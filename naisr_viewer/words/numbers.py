@@ -1,11 +1,11 @@
-"""How values, volumes and errors are put everywhere in the window. Knows no Qt."""
+"""How values, volumes and errors are put everywhere in the window."""
 
 from __future__ import annotations
 
 import math
 
+from naisr_model.covariates import Covariate
 from naisr_model.errors import InputError
-from naisr_viewer.state.explorer import Covariate
 
 
 def decimals(covariate: Covariate) -> int:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from naisr_model.covariates import Covariate
-from naisr_viewer.state.explorer import label
 from naisr_viewer.state.patients import Fitted, Method, Scan
 from naisr_viewer.words.numbers import capitalised, reading, volume
+from naisr_viewer.words.titles import label
 
 LONGEST_WORD = 28
 """Letters that surely fit into a line; longer names are broken anywhere."""
@@ -55,11 +55,14 @@ def findings(fit: Fitted, covariates: Sequence[Covariate]) -> list[tuple[str, st
     for each in covariates:
         how = interval(each, *sure[each.name]) if each.name in sure else "known"
         rows.append((label(each.name), reading(each, values[each.name]), how))
+    lasting = []
+    if fit.lasting is not None:
+        lasting.append(("Lasting", f"{100 * fit.lasting:.0f} %", "of what sets the patient apart"))
     return [
         *rows,
         ("Volume", f"{volume(fit.volume_cm3, fit.volume_margin_cm3)} (95 %)", ""),
         ("Residual", f"{fit.residual_mm:.2f} mm", "mean distance, scan to fitted surface"),
-        ("Lasting", f"{100 * fit.lasting:.0f} %", "of what sets the patient apart"),
+        *lasting,
         ("Time", f"{fit.seconds:.1f} s", ""),
     ]
 

@@ -1,48 +1,51 @@
-"""The line at the bottom left. Knows no Qt."""
+"""The line at the bottom left."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 
-from naisr_viewer.state.explorer import ExplorerState, Panel, visible_panels
-from naisr_viewer.state.requests import EXACT_RESOLUTION, Origin, SurfaceResult, missing
+from naisr_viewer.state.requests import EXACT_RESOLUTION, Origin, SurfaceResult
 
 
-def status_line(
-    state: ExplorerState,
-    shown: Mapping[Panel, SurfaceResult],
-    *,
-    is_busy: bool,
-    is_refining: bool,
-    halted: str,
-    notice: str,
-) -> str:
-    """What is on screen and what is being done about it.
+@dataclass(frozen=True)
+class Situation:
+    """What the line tells.
 
-    Args:
-        state: what shall be on screen.
-        shown: what has been shown of each panel.
+    Attributes:
+        views: how many sub-plots there shall be; none without an atlas.
+        results: what is shown in them.
+        late: how many of them show earlier values, or nothing yet.
         is_busy: whether anything is being computed.
         is_refining: whether exact surfaces are.
         halted: why nothing is computed any more; empty where nothing halted it.
         notice: what else there is to tell, for example of a file that was written.
     """
-    panels = visible_panels(state)
-    results = [shown[panel] for panel in panels if panel in shown]
-    if state.atlas is None or not results:
-        return halted or ("Opening …" if is_busy else "No atlas open")
-    exact = [result for result in results if result.is_exact]
-    coarse = [result for result in results if not result.is_exact]
-    late = len(missing(state, shown, 0))
-    behind = f"{late} of {len(panels)} views"
-    if late and halted:
-        return f"{halted} · {behind} show earlier values"
-    if late and not coarse:
+
+    views: int
+    results: Sequence[SurfaceResult]
+    late: int
+    is_busy: bool
+    is_refining: bool
+    halted: str
+    notice: str
+
+
+def status_line(now: Situation) -> str:
+    """What is on screen and what is being done about it."""
+    if not now.results:
+        return now.halted or ("Opening …" if now.is_busy else "No atlas open")
+    exact = [result for result in now.results if result.is_exact]
+    coarse = [result for result in now.results if not result.is_exact]
+    behind = f"{now.late} of {now.views} views"
+    if now.late and now.halted:
+        return f"{now.halted} · {behind} show earlier values"
+    if now.late and not coarse:
         return f"Updating {behind} …"
     text = _in_short(coarse or exact)
-    if is_refining:
-        text += f" · refining to {EXACT_RESOLUTION}³, {len(exact)} of {len(results)} views done"
-    return " · ".join(filter(None, (text, halted, notice)))
+    if now.is_refining:
+        text += f" · refining to {EXACT_RESOLUTION}³, {len(exact)} of {len(now.results)} views done"
+    return " · ".join(filter(None, (text, now.halted, now.notice)))
 
 
 def _in_short(results: Sequence[SurfaceResult]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -10,18 +11,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from PySide6.QtCore import QSettings
+from PySide6.QtCore import QEvent, QSettings
+from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
+from naisr_model.capabilities import Capabilities
 from naisr_model.covariates import Covariate, Population
 from naisr_model.errors import Cancelled, InputError
 from naisr_model.frames import Frame
+from naisr_model.progress import SILENT
 from naisr_model.surface.displacements import DisplacementTables
 from naisr_model.surface.tracking import Tracked
 from naisr_viewer.control.controller import Controller
+from naisr_viewer.control.preferences import Preferences
 from naisr_viewer.control.worker import Worker
 from naisr_viewer.engine.engine import Engine
-from naisr_viewer.state.explorer import AtlasCard
+from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.views.main_window import MainWindow
 
 AGE = Covariate("age", "months", "continuous", 100.0, 60.0, (1.0, 220.0))
@@ -70,6 +75,14 @@ class EllipsoidAtlas:
         self.name = name
         self.population = people()
         self.covariates = COVARIATES
+        self.capabilities = Capabilities(
+            deformable=True,
+            disentangleable=True,
+            evolvable=True,
+            transferable=True,
+            has_template=True,
+            vanishes_at_centre=True,
+        )
         self.frame = Frame((0.0, 0.0, 0.0), 100.0)
         self.step_s, self.steps = step_s, steps
         self.calls: list[tuple[str, dict[str, float], int]] = []
@@ -86,8 +99,8 @@ class EllipsoidAtlas:
         """The true volume."""
         return 4 / 3 * np.pi * float(np.prod(self.half_axes_mm(**values))) / 1000
 
-    def template(self, resolution=128, *, progress=None, should_stop=None):
-        return self._surface("template", {}, resolution, progress, should_stop)
+    def template(self, resolution=128, *, progress=SILENT):
+        return self._surface("template", {}, resolution, progress)
 
     def effect(
         self,
@@ -98,10 +111,9 @@ class EllipsoidAtlas:
         *,
         extrapolate=False,
         tracker=None,
-        progress=None,
-        should_stop=None,
+        progress=SILENT,
     ):
-        return self._surface(name, {name: value}, resolution, progress, should_stop)
+        return self._surface(name, {name: value}, resolution, progress)
 
     def shape(
         self,
@@ -111,32 +123,28 @@ class EllipsoidAtlas:
         *,
         extrapolate=False,
         tracker=None,
-        progress=None,
-        should_stop=None,
+        progress=SILENT,
     ):
-        return self._surface("shape", dict(covariates), resolution, progress, should_stop)
+        return self._surface("shape", dict(covariates), resolution, progress)
 
-    def tabulate(self, template, latent=None, *, progress=None, should_stop=None):
+    def tabulate(self, template, latent=None, *, progress=SILENT):
         """Nothing needs to be tabulated: the tracker knows the ellipsoids."""
         self.calls.append(("tabulate", {}, 0))
-        if should_stop is not None and should_stop():
-            raise Cancelled
+        progress.check()
         return DisplacementTables(np.zeros((2, 3)), ())
 
     def tracker(self, template, tables):
         return EllipsoidTracker(template)
 
-    def _surface(self, what, values, resolution, progress, should_stop):
+    def _surface(self, what, values, resolution, progress):
         self.calls.append((what, values, resolution))
         self.running += 1
         try:
-            for step in range(self.steps):
-                if should_stop is not None and should_stop():
-                    self.cancelled += 1
-                    raise Cancelled
+            for _ in progress.over(range(self.steps)):
                 time.sleep(self.step_s)
-                if progress is not None:
-                    progress((step + 1) / self.steps)
+        except Cancelled:
+            self.cancelled += 1
+            raise
         finally:
             self.running -= 1
         mesh = trimesh.creation.icosphere(subdivisions=2 if resolution < 100 else 4)
@@ -148,6 +156,21 @@ class EllipsoidAtlas:
 def no_traces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Keep tabulated displacements out of the cache of whoever runs the tests."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "user-cache"))
+
+
+@pytest.fixture(autouse=True)
+def nothing_outlives_a_test() -> Iterator[None]:
+    """No window, timer's owner or thread of ours is left when a test ends."""
+    before = set(threading.enumerate())
+    yield
+    app = QApplication.instance()
+    if isinstance(app, QApplication):
+        gc.collect()
+        app.sendPostedEvents(None, QEvent.Type.DeferredDelete.value)
+        left = [widget for widget in app.topLevelWidgets() if widget.parent() is None]
+        assert left == []
+    threads = [thread.name for thread in set(threading.enumerate()) - before]
+    assert [name for name in threads if name.startswith("naisr")] == []
 
 
 @pytest.fixture
@@ -192,7 +215,7 @@ def open_window(
 
     def make(size: tuple[int, int] = (960, 640)) -> tuple[MainWindow, Controller]:
         window = MainWindow()
-        controller = Controller(window, engine, Worker(), Worker(), settings)
+        controller = Controller(window, engine, Worker(), Worker(), Preferences(settings))
         made.append((window, controller))
         window.resize(*size)
         window.show()

@@ -14,22 +14,19 @@ from naisr_model.atlas import Atlas
 from naisr_model.data.samples import signed_distance
 from naisr_model.errors import Cancelled, InputError
 from naisr_model.learning.fitting import prior
+from naisr_model.progress import Progress
 from naisr_viewer.engine.clinic import SHOWN_POINTS, Clinic
 from naisr_viewer.engine.engine import Engine
-from naisr_viewer.engine.members import rounded
-from naisr_viewer.state.explorer import (
-    BEFORE,
-    CERTAINTY,
-    CHANGE,
-    FULL_SHAPE,
-    SCAN,
-    ExplorerState,
-    opened,
-    with_patient,
-    with_value,
-)
-from naisr_viewer.state.patients import Patient, Reading
-from naisr_viewer.state.requests import request_for
+from naisr_viewer.engine.surfaces import rounded
+from naisr_viewer.panels.kinds import request_for
+from naisr_viewer.state.explorer import ExplorerState, opened, with_patient, with_value
+from naisr_viewer.state.layouts import FULL_SHAPE, Panel
+from naisr_viewer.state.patients import OpenScan, Reading
+
+BEFORE = Panel("before")
+UNCERTAINTY = Panel("uncertainty")
+CHANGE = Panel("change")
+SCAN = Panel("scan")
 
 KNOWN = (("age", 6.0), ("sex", 1.0))
 
@@ -50,9 +47,9 @@ def desk(egg_atlas: Path, file: Path, tmp_path_factory: pytest.TempPathFactory):
     reading = Reading(file)
     scan = clinic.read(egg_atlas, reading, KNOWN)
     told: list[float] = []
-    fit = clinic.fit(egg_atlas, scan, KNOWN, told.append)
+    fit = clinic.fit(egg_atlas, scan, KNOWN, Progress(told.append))
     assert told == sorted(told) and told[-1] == pytest.approx(1)
-    return engine, clinic, with_patient(state, Patient(1, file.name, reading, scan, KNOWN, fit))
+    return engine, clinic, with_patient(state, OpenScan(1, file.name, reading, scan, KNOWN, fit))
 
 
 def test_a_scan_is_read_as_it_is(desk):
@@ -79,8 +76,8 @@ def test_elsewhere_only_what_lasts_of_a_patient_is_shown(egg_atlas, tmp_path, mo
     clinic, state = Clinic(engine), opened(ExplorerState(), engine.open(egg_atlas))
     reading = Reading(file)
     scan = clinic.read(egg_atlas, reading, KNOWN)
-    fit = clinic.fit(egg_atlas, scan, KNOWN, lambda _: None)
-    state = with_patient(state, Patient(1, file.name, reading, scan, KNOWN, fit))
+    fit = clinic.fit(egg_atlas, scan, KNOWN)
+    state = with_patient(state, OpenScan(1, file.name, reading, scan, KNOWN, fit))
     elsewhere = with_value(state, "age", 3.0)
     assert fit.lasting == 0.3
     person = atlas.fit(trimesh.load_mesh(file), dict(KNOWN)).at({"age": 3.0})
@@ -93,7 +90,7 @@ def test_elsewhere_only_what_lasts_of_a_patient_is_shown(egg_atlas, tmp_path, mo
     colouring = engine.surface(request_for(elsewhere, SCAN, 128)).colouring
     assert colouring is not None
     off_mm, whole_off_mm = (
-        np.abs(colouring.values_mm - atlas.sdf(scan.points_mm, values, share * person.latent)).mean()
+        np.abs(colouring.values - atlas.sdf(scan.points_mm, values, share * person.latent)).mean()
         for share in (1, 1 / 0.3)
     )
     assert off_mm < 0.1 * whole_off_mm
@@ -105,8 +102,8 @@ def test_the_scan_carries_its_distance_to_the_shape(desk):
     scan = engine.surface(request_for(state, SCAN, 128))
     mesh = trimesh.Trimesh(shape.points_mm, shape.faces, process=False)
     outside_mm = signed_distance(mesh, scan.points_mm.astype(np.float64))
-    assert scan.colouring.is_signed
-    np.testing.assert_allclose(scan.colouring.values_mm, outside_mm, atol=0.1)
+    assert scan.colouring.scale == "signed"
+    np.testing.assert_allclose(scan.colouring.values, outside_mm, atol=0.1)
     assert engine.surface(request_for(state, SCAN, 40)).colouring is None  # on the way there is no time
 
 
@@ -114,36 +111,36 @@ def test_a_younger_shape_leaves_the_scan_outside(desk):
     engine, _, state = desk
     scan = engine.surface(request_for(with_value(state, "age", 3.0), SCAN, 128))
     poles = np.abs(scan.points_mm[:, 2] - scan.points_mm[:, 2].mean()) > 28
-    assert scan.colouring.values_mm[poles].mean() > 2
+    assert scan.colouring.values[poles].mean() > 2
 
 
 def test_uncertainty_is_positive_and_grows_with_what_is_not_known(desk, egg_atlas):
     engine, clinic, state = desk
-    told = engine.surface(request_for(state, CERTAINTY, 128))
-    assert not told.colouring.is_signed and (told.colouring.values_mm > 0).all()
-    fit = clinic.fit(egg_atlas, state.shown.scan, (), lambda share: None)
+    told = engine.surface(request_for(state, UNCERTAINTY, 128))
+    assert told.colouring.scale == "unsigned" and (told.colouring.values > 0).all()
+    fit = clinic.fit(egg_atlas, state.shown.scan, ())
     assert {name for name, _, _ in fit.intervals} == {"age", "sex"}
     untold = with_patient(state, replace(state.shown, known=(), fit=fit))
-    unsure = engine.surface(request_for(untold, CERTAINTY, 128))
-    assert np.mean(unsure.colouring.values_mm) > 0.5 * np.mean(told.colouring.values_mm)
+    unsure = engine.surface(request_for(untold, UNCERTAINTY, 128))
+    assert np.mean(unsure.colouring.values) > 0.5 * np.mean(told.colouring.values)
     clinic.forget(fit)
     with pytest.raises(Cancelled):
-        engine.surface(request_for(untold, CERTAINTY, 128))
+        engine.surface(request_for(untold, UNCERTAINTY, 128))
 
 
 def test_a_change_is_counted_along_the_normals_from_point_to_point(desk):
     """Eggs grow 2 mm a year at each pole and not at the equator."""
     engine, _, state = desk
     still = engine.surface(request_for(state, CHANGE, 128))
-    np.testing.assert_allclose(still.colouring.values_mm, 0, atol=0.1)
+    np.testing.assert_allclose(still.colouring.values, 0, atol=0.1)
     older = with_value(state, "age", 8.0)
     before = engine.surface(request_for(older, BEFORE, 128))
     after = engine.surface(request_for(older, FULL_SHAPE, 128))
     for resolution in (40, 128):
         change = engine.surface(request_for(older, CHANGE, resolution))
         up = np.abs(change.normals[:, 2])
-        assert change.colouring.values_mm[up > 0.98].mean() == pytest.approx(4, abs=1)
-        assert np.abs(change.colouring.values_mm[up < 0.1]).mean() < 0.5
+        assert change.colouring.values[up > 0.98].mean() == pytest.approx(4, abs=1)
+        assert np.abs(change.colouring.values[up < 0.1]).mean() < 0.5
         gained = change.volume_cm3 - change.volume_before_cm3
         assert gained == pytest.approx(after.volume_cm3 - before.volume_cm3, rel=0.05)
     assert after.volume_margin_cm3 > 0
@@ -155,11 +152,11 @@ def test_two_patients_can_be_compared(desk, egg_atlas, tmp_path):
     egg(3.0, 1.0).export(other)
     reading = Reading(other)
     scan = clinic.read(egg_atlas, reading, ())
-    fit = clinic.fit(egg_atlas, scan, (("age", 3.0), ("sex", 1.0)), lambda share: None)
-    both = with_patient(state, Patient(2, other.name, reading, scan, (), fit))
+    fit = clinic.fit(egg_atlas, scan, (("age", 3.0), ("sex", 1.0)))
+    both = with_patient(state, OpenScan(2, other.name, reading, scan, (), fit))
     change = engine.surface(request_for(replace(both, compared=1), CHANGE, 128))
     assert change.volume_before_cm3 == pytest.approx(state.fit.volume_cm3)
-    assert change.colouring.values_mm[np.abs(change.normals[:, 2]) > 0.98].mean() < -4
+    assert change.colouring.values[np.abs(change.normals[:, 2]) > 0.98].mean() < -4
     clinic.forget(fit)
 
 
@@ -191,7 +188,7 @@ def test_a_cloud_is_thinned_for_display_only(desk, egg_atlas, tmp_path):
     np.savetxt(path, trimesh.sample.sample_surface(egg(5.0, -1.0), 3 * SHOWN_POINTS, seed=0)[0])
     scan = clinic.read(egg_atlas, Reading(path), ())
     assert len(scan.faces) == 0 and 0 < len(scan.points_mm) <= SHOWN_POINTS
-    fit = clinic.fit(egg_atlas, scan, (("age", 5.0),), lambda share: None)
+    fit = clinic.fit(egg_atlas, scan, (("age", 5.0),))
     assert fit.residual_mm < 0.5
     clinic.forget(fit)
 
@@ -207,10 +204,10 @@ def test_what_cannot_be_read_is_one_sentence(desk, egg_atlas, tmp_path):
 def test_a_fit_that_is_stopped_leaves_nobody_behind(desk, egg_atlas, share):
     """While it fits, or while the surface is made that its volume is measured on."""
     engine, clinic, state = desk
-    people, told = dict(engine._members), [0.0]
+    people, told = engine.persons, [0.0]
     with pytest.raises(Cancelled):
-        clinic.fit(egg_atlas, state.shown.scan, KNOWN, told.append, lambda: told[-1] >= share)
-    assert engine._members == people
+        clinic.fit(egg_atlas, state.shown.scan, KNOWN, Progress(told.append, lambda: told[-1] >= share))
+    assert engine.persons == people
 
 
 @pytest.mark.parametrize(("length", "expected"), [(2.84, 2), (3.6, 5), (22, 20), (0.9, 1), (69, 50)])

@@ -12,10 +12,13 @@ import trimesh
 from naisr_model.atlas import Atlas
 from naisr_model.errors import Cancelled, InputError
 from naisr_model.frames import Frame
+from naisr_model.progress import Progress
 from naisr_viewer.engine import cache
 from naisr_viewer.engine.engine import CACHED_SURFACES, Engine
-from naisr_viewer.state.explorer import FULL_SHAPE, TEMPLATE, Panel
-from naisr_viewer.state.requests import Origin, SurfaceRequest, answers
+from naisr_viewer.state.layouts import FULL_SHAPE, TEMPLATE, Panel
+from naisr_viewer.state.requests import Origin, SurfaceRequest
+
+UNWANTED = Progress(is_unwanted=lambda: True)
 
 
 def ask(path: Path, panel: Panel = FULL_SHAPE, resolution: int = 128, **values: float) -> SurfaceRequest:
@@ -84,13 +87,13 @@ def test_opening_a_file_again_forgets_its_old_surfaces(engine, card):
 
 def test_cancelling_is_passed_on(engine, card):
     with pytest.raises(Cancelled):
-        engine.surface(ask(card.path), should_stop=lambda: True)
+        engine.surface(ask(card.path), UNWANTED)
     assert engine.cached(ask(card.path)) is None
 
 
 def test_progress_is_passed_on(engine, card):
     seen: list[float] = []
-    engine.surface(ask(card.path), seen.append)
+    engine.surface(ask(card.path), Progress(seen.append))
     assert seen[-1] == 1.0
 
 
@@ -111,14 +114,6 @@ def test_an_atlas_of_curves_is_refused_in_words(atlas, atlas_file):
     atlas.frame = Frame((0.0, 0.0), 1.0)
     with pytest.raises(InputError, match="2D"):
         Engine(lambda _: atlas).open(atlas_file)
-
-
-def test_a_finer_surface_answers_a_coarser_question(engine, card):
-    fine = engine.surface(ask(card.path, age=50.0))
-    assert answers(fine, ask(card.path, resolution=40, age=50.0))
-    assert not answers(fine, ask(card.path, resolution=256, age=50.0))
-    assert not answers(fine, ask(card.path, resolution=40, age=51.0))
-    assert not answers(None, ask(card.path))
 
 
 def tabulations(atlas) -> int:
@@ -192,7 +187,7 @@ def test_a_broken_cache_costs_time_and_no_more(engine, card, atlas, tmp_path, da
 def test_tabulating_can_be_cancelled_and_leaves_nothing(engine, card, tmp_path):
     engine.surface(ask(card.path, TEMPLATE))
     with pytest.raises(Cancelled):
-        engine.prepare_previews(card.path, should_stop=lambda: True)
+        engine.prepare_previews(card.path, progress=UNWANTED)
     assert not engine.has_previews(card.path)
     assert not (tmp_path / "cache").exists()
 
@@ -282,7 +277,7 @@ def test_nothing_old_is_shown_of_another_file_or_by_another_version(
     if changed == "file":
         card.path.write_bytes(b"trained on")
     else:
-        monkeypatch.setattr(cache, "_program_digest", lambda: b"newer")
+        monkeypatch.setattr(cache, "program_digest", lambda: b"newer")
     loader = Loader(atlas)
     again = Engine(loader, tmp_path / "cache")
     again.open(card.path)

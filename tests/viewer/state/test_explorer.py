@@ -1,4 +1,4 @@
-"""The pure part: values, panels, what changes, undo."""
+"""The pure part: values, patients, what changes."""
 
 from __future__ import annotations
 
@@ -8,10 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from naisr_viewer.panels.kinds import request_for, visible_panels
 from naisr_viewer.state import explorer as st
-from naisr_viewer.state.explorer import AtlasCard, ExplorerState, History, Layout, Panel
-from naisr_viewer.state.patients import Fitted, Named, Patient, Reading, Scan
-from naisr_viewer.state.requests import request_for
+from naisr_viewer.state.atlas_card import AtlasCard
+from naisr_viewer.state.explorer import ExplorerState
+from naisr_viewer.state.layouts import FULL_SHAPE, TEMPLATE, Layout, Panel
+from naisr_viewer.state.patients import Fitted, Named, OpenScan, Reading, Scan
+
+BEFORE, CHANGE = Panel("before"), Panel("change")
 
 
 @pytest.fixture
@@ -30,24 +34,24 @@ def test_values_stay_in_the_observed_range(start):
 
 def changed(old: ExplorerState, new: ExplorerState) -> set[Panel]:
     """Panels on screen that are asked for anew."""
-    asked = {request_for(old, panel, 128) for panel in st.visible_panels(old)}
-    return {panel for panel in st.visible_panels(new) if request_for(new, panel, 128) not in asked}
+    asked = {request_for(old, panel, 128) for panel in visible_panels(old)}
+    return {panel for panel in visible_panels(new) if request_for(new, panel, 128) not in asked}
 
 
 def test_age_changes_its_own_effect_and_the_full_shape_only(start):
-    assert changed(start, st.with_value(start, "age", 12)) == {Panel("effect", "age"), st.FULL_SHAPE}
+    assert changed(start, st.with_value(start, "age", 12)) == {Panel("effect", "age"), FULL_SHAPE}
 
 
 def test_a_layout_change_asks_only_for_the_panels_that_come_into_view(start):
     narrow = replace(start, layout=Layout.FULL_SHAPE)
-    assert st.visible_panels(narrow) == (st.FULL_SHAPE,)
+    assert visible_panels(narrow) == (FULL_SHAPE,)
     assert changed(start, narrow) == set()
     assert len(changed(narrow, start)) == 4
 
 
 def test_the_template_depends_on_no_covariate(start):
-    assert st.panel_values(start, st.TEMPLATE) == ()
-    assert st.panel_values(start, Panel("effect", "weight")) == (("weight", 35.0),)
+    assert request_for(start, TEMPLATE, 0).values == ()
+    assert request_for(start, Panel("effect", "weight"), 0).values == (("weight", 35.0),)
 
 
 def test_resets(start):
@@ -75,12 +79,12 @@ def test_what_is_off_the_population_stays_off(start):
 # --- patients -------------------------------------------------------------------------------------
 
 
-def patient(key: int, known: Named = (), person: int = 0, age: float = 84.0) -> Patient:
+def patient(key: int, known: Named = (), person: int = 0, age: float = 84.0) -> OpenScan:
     none = np.zeros((0, 3), np.float32)
     scan = Scan(none, none, none.astype(np.int64), "p.stl")
     values = (("age", age), ("weight", 20.0), ("sex", 1.0))
     fit = Fitted(person, values, (("weight", 18.0, 22.0),), 48.0, 2.0, 0.3, 0.4, 1.0) if person else None
-    return Patient(key, f"p{key}.stl", Reading(Path(f"p{key}.stl")), scan, known, fit)
+    return OpenScan(key, f"p{key}.stl", Reading(Path(f"p{key}.stl")), scan, known, fit)
 
 
 def test_a_scan_that_is_not_fitted_is_shown_over_the_average_at_what_is_known(start):
@@ -93,21 +97,21 @@ def test_a_fitted_patient_is_home(start):
     state = st.with_patient(start, patient(1, person=7))
     assert state.values == state.home == (84.0, 20.0, 1.0)
     assert st.reset_all(st.with_value(state, "age", 200)).values == (84.0, 20.0, 1.0)
-    assert request_for(state, st.FULL_SHAPE, 128).person == 7
-    assert request_for(state, st.TEMPLATE, 128).person == 0  # everybody's
+    assert request_for(state, FULL_SHAPE, 128).person == 7
+    assert request_for(state, TEMPLATE, 128).person == 0  # everybody's
 
 
 def test_changes_are_counted_from_the_patient_as_fitted_or_from_another(start):
     state = st.with_patient(st.with_patient(start, patient(1, person=7, age=60)), patient(2, person=8))
     state = st.with_value(replace(state, layout=Layout.CHANGE), "age", 120)
-    assert st.visible_panels(state) == (st.BEFORE, st.FULL_SHAPE, st.CHANGE)
-    own = request_for(state, st.CHANGE, 128)
+    assert visible_panels(state) == (BEFORE, FULL_SHAPE, CHANGE)
+    own = request_for(state, CHANGE, 128)
     assert own.person == 8 and own.before == (8, (("age", 84.0), ("weight", 20.0), ("sex", 1.0)))
     other = replace(state, compared=1)
-    assert request_for(other, st.CHANGE, 128).before == (7, (("age", 60.0), ("weight", 20.0), ("sex", 1.0)))
-    before = request_for(other, st.BEFORE, 128)
+    assert request_for(other, CHANGE, 128).before == (7, (("age", 60.0), ("weight", 20.0), ("sex", 1.0)))
+    before = request_for(other, BEFORE, 128)
     assert before.person == 7 and dict(before.values)["age"] == 60
-    assert changed(state, st.with_value(state, "age", 121)) == {st.FULL_SHAPE, st.CHANGE}
+    assert changed(state, st.with_value(state, "age", 121)) == {FULL_SHAPE, CHANGE}
 
 
 def test_closing_a_patient_shows_the_last_of_the_others(start):
@@ -123,56 +127,3 @@ def test_closing_a_patient_shows_the_last_of_the_others(start):
 def test_another_atlas_has_other_patients(start, card):
     state = replace(st.with_patient(start, patient(1, person=7)), layout=Layout.CHANGE)
     assert st.opened(state, card).patients == () and st.opened(state, card).layout is Layout.SIDE_BY_SIDE
-
-
-def test_panels_are_named_for_people(card):
-    titles = [st.panel_title(panel) for panel in st.all_panels(card)]
-    assert titles == ["Template", "Age only", "Weight only", "Sex only", "Full shape"]
-    assert st.label("body_weight") == "Body weight"
-
-
-def test_undo_and_redo_walk_the_same_way_back_and_forth():
-    visited = [(1.0,), (2.0,), (3.0,)]
-    history = st.record(st.record(History(), visited[0], visited[1]), visited[1], visited[2])
-    history, now = st.undo(history, visited[2])
-    assert now == visited[1]
-    history, now = st.undo(history, now)
-    assert now == visited[0]
-    assert st.undo(history, now) == (history, now)
-    history, now = st.redo(history, now)
-    history, now = st.redo(history, now)
-    assert now == visited[2]
-    assert st.redo(history, now) == (history, now)
-
-
-def test_a_new_change_forgets_what_was_undone():
-    history, now = st.undo(st.record(History(), (1.0,), (2.0,)), (2.0,))
-    assert st.record(history, now, (5.0,)).future == ()
-    assert st.record(history, now, now) is history
-
-
-def test_the_undo_stack_does_not_grow_without_end():
-    history = History()
-    for step in range(3 * st.UNDO_DEPTH):
-        history = st.record(history, (float(step),), (step + 1.0,))
-    assert len(history.past) == st.UNDO_DEPTH
-
-
-def test_a_toddler_of_adult_weight_is_outside_the_data(card):
-    population = card.population
-    assert st.is_seen(population, {"age": 12, "weight": 8})
-    assert st.is_seen(population, {"age": 120, "weight": 41, "sex": 1})
-    assert not st.is_seen(population, {"age": 12, "weight": 80})
-    assert not st.is_seen(population, {"age": 5})  # the others at their mean: 35 kg at 5 months
-
-
-def test_nearly_all_real_people_count_as_seen(card):
-    population = card.population
-    rows = [population.row(i) for i in np.flatnonzero(population.held_out)]
-    assert np.mean([st.is_seen(population, row) for row in rows]) > 0.9
-
-
-def test_without_continuous_covariates_everybody_is_seen(card):
-    sex = card.covariates[2]
-    population = replace(card.population, covariates=(sex,), values=np.ones((200, 1)))
-    assert st.is_seen(population, {"sex": -1.0})

@@ -1,0 +1,124 @@
+"""How the request of a view is answered: what an answer is, and what it may ask in turn."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from naisr_model.progress import Progress
+from naisr_viewer.engine.members import Member
+from naisr_viewer.engine.previews import Previews
+from naisr_viewer.engine.surfaces import deviation_mm, from_mesh
+from naisr_viewer.state.atlas_card import AtlasCard
+from naisr_viewer.state.layouts import FULL_SHAPE, TEMPLATE, Panel
+from naisr_viewer.state.requests import EXACT_RESOLUTION, SurfaceRequest, SurfaceResult
+
+if TYPE_CHECKING:
+    import trimesh
+
+    from naisr_model.atlas import Atlas
+    from naisr_model.surface.tracking import Tracker
+
+    Make = Callable[
+        [Atlas, SurfaceRequest, NDArray[np.float64] | None, Tracker | None, Progress], trimesh.Trimesh
+    ]
+    """What the networks have at the values of a request, for a code (None for the average's); a tracker
+    tells them where to look first."""
+
+
+class Who(NamedTuple):
+    """Whom a request is about.
+
+    Attributes:
+        card: of the open atlas.
+        member: who was fitted; None for the population average.
+        tracker: what carries the template for that person; None as long as previews are not prepared.
+    """
+
+    card: AtlasCard
+    member: Member | None
+    tracker: Tracker | None
+
+
+class Source(Protocol):
+    """What an answer may ask; :class:`~naisr_viewer.engine.engine.Engine` is one."""
+
+    @property
+    def previews(self) -> Previews:
+        """Where each sub-plot's preview was left."""
+
+    def atlas(self, path: Path) -> Atlas:
+        """The networks of an open atlas."""
+
+    def who(self, path: Path, person: int) -> Who:
+        """Whom a request is about."""
+
+    def surface(self, request: SurfaceRequest, progress: Progress) -> SurfaceResult:
+        """The answer to another request."""
+
+    def prepare_previews(self, path: Path, person: int, progress: Progress) -> None:
+        """Make previews of a person fast."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """How requests for one kind of view are answered.
+
+    Attributes:
+        give: the result, whose request is the one that was asked; raises ``Cancelled`` when nobody waits.
+        is_plain: whether it is nothing but a surface: requests with the same one then share an answer, see
+            :func:`simplest`.
+    """
+
+    give: Callable[[Source, SurfaceRequest, Progress], SurfaceResult]
+    is_plain: bool = False
+
+
+def plain(make: Make) -> Answer:
+    """A surface, from the tables while it moves and from the networks at rest.
+
+    A person's has the margin of its volume at rest, and where there was a preview, how far off that was.
+    """
+
+    def give(source: Source, request: SurfaceRequest, progress: Progress) -> SurfaceResult:
+        _, member, tracker = source.who(request.atlas, request.person)
+        if tracker is not None and request.resolution < EXACT_RESOLUTION:
+            return source.previews.surface(request, tracker)
+        atlas, start = source.atlas(request.atlas), time.perf_counter()
+        latent = None if member is None else member.at(request.values).latent
+        mesh = make(atlas, request, latent, tracker, progress)
+        progress.check()
+        result = from_mesh(request, mesh, start)
+        if member is not None and result.is_exact:
+            margin_cm3 = member.at(request.values).volume_margin_cm3(mesh)
+            result = replace(result, volume_margin_cm3=margin_cm3)
+        if tracker is not None and len(result.faces):
+            error_mm = deviation_mm(source.previews.track(request, tracker).points_mm, result)
+            result = replace(result, preview_error_mm=error_mm)
+        return result
+
+    return Answer(give, is_plain=True)
+
+
+def simplest(request: SurfaceRequest, atlas: AtlasCard) -> SurfaceRequest:
+    """The request with the fewest covariates that has the same surface as ``request``.
+
+    g_i vanishes where covariate i is at its centre, so Phi with a single covariate off its centre is
+    that covariate's Phi_i, and with none it is the template T, whoever it is. Of other shape models nothing
+    of the kind is known.
+    """
+    if not atlas.capabilities.vanishes_at_centre:
+        return request
+    centre = {covariate.name: covariate.centre for covariate in atlas.covariates}
+    moved = tuple((name, value) for name, value in request.values if value != centre[name])
+    if len(moved) > 1:
+        return replace(request, panel=FULL_SHAPE, values=moved)
+    if moved:
+        return replace(request, panel=Panel("effect", moved[0][0]), values=moved)
+    return replace(request, panel=TEMPLATE, values=(), person=0)

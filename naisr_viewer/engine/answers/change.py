@@ -1,0 +1,71 @@
+"""A shape with the way that its points have come since another; plain while previews are coarse."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from naisr_model.progress import SILENT, Progress
+from naisr_viewer.engine.answers.base import Answer, Source
+from naisr_viewer.engine.members import Member
+from naisr_viewer.engine.surfaces import at_nearest, limit_mm, volume_cm3
+from naisr_viewer.state.layouts import FULL_SHAPE
+from naisr_viewer.state.requests import EXACT_RESOLUTION, Colouring, Origin, SurfaceRequest, SurfaceResult
+
+if TYPE_CHECKING:
+    from naisr_model.surface.tracking import Tracked
+
+SHARE = 0.08
+"""End of the colour scale, see :func:`~naisr_viewer.engine.surfaces.limit_mm`."""
+
+
+def _give(source: Source, request: SurfaceRequest, progress: Progress) -> SurfaceResult:
+    assert request.before is not None
+    path, (person, values) = request.atlas, request.before
+    shape = replace(
+        source.surface(replace(request, panel=FULL_SHAPE, before=None), progress), request=request
+    )
+    if not len(shape.faces):
+        return shape
+    for each in {request.person, person} if shape.is_exact else ():
+        source.prepare_previews(path, each, progress)
+    _, member, tracker = source.who(path, request.person)
+    earlier = source.who(path, person).tracker
+    if member is None or tracker is None or earlier is None:
+        return shape
+    first = later = source.previews.track_before(path, person, values, earlier)
+    before_mm = first.points_mm
+    if shape.origin is Origin.NETWORK:
+        later = source.previews.track(request, tracker)
+        moved_mm = first.points_mm - later.points_mm
+        before_mm = shape.points_mm + at_nearest(later.points_mm, moved_mm, shape.points_mm)
+    return replace(
+        shape,
+        colouring=_moved(member, before_mm, shape),
+        volume_before_cm3=_volume_before_cm3(source, request, first, tracker.faces),
+        doubtful=shape.doubtful or not (first.is_trustworthy and later.is_trustworthy),
+    )
+
+
+def _moved(member: Member, before_mm: NDArray[np.float32], shape: SurfaceResult) -> Colouring:
+    """How far corresponding points ``[n, 3]`` have moved along the normals of the later surface."""
+    moved_mm = np.sum((shape.points_mm - before_mm) * shape.normals, axis=1)
+    return Colouring(moved_mm.astype(np.float32), limit_mm(member.atlas_model, SHARE), "signed")
+
+
+def _volume_before_cm3(
+    source: Source, request: SurfaceRequest, first: Tracked, faces: NDArray[np.int64]
+) -> float:
+    """Of the same kind as the later volume: both exact, or both of previews."""
+    assert request.before is not None
+    if request.resolution < EXACT_RESOLUTION:
+        return volume_cm3(first.points_mm, first.normals, faces)
+    person, values = request.before
+    before = replace(request, panel=FULL_SHAPE, person=person, values=values, before=None)
+    return source.surface(before, SILENT).volume_cm3
+
+
+ANSWER = Answer(_give)

@@ -1,0 +1,17 @@
+"""How each kind of view is answered, by its name."""
+
+from __future__ import annotations
+
+from naisr_viewer.engine.answers import change, effect, scan, shape, template, uncertainty
+from naisr_viewer.engine.answers.base import Answer
+
+ANSWERS: dict[str, Answer] = {
+    "template": template.ANSWER,
+    "effect": effect.ANSWER,
+    "before": shape.ANSWER,
+    "shape": shape.ANSWER,
+    "scan": scan.ANSWER,
+    "uncertainty": uncertainty.ANSWER,
+    "change": change.ANSWER,
+}
+"""One line a kind, as among the panels."""

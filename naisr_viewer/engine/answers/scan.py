@@ -1,0 +1,44 @@
+"""A patient's scan; at rest with its distance to the person's shape."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from naisr_model.progress import Progress
+from naisr_viewer.engine.answers.base import Answer, Source
+from naisr_viewer.engine.members import Member
+from naisr_viewer.engine.surfaces import limit_mm
+from naisr_viewer.state.patients import Named
+from naisr_viewer.state.requests import EXACT_RESOLUTION, Colouring, Origin, SurfaceRequest, SurfaceResult
+
+SHARE = 0.02
+"""End of the colour scale, see :func:`~naisr_viewer.engine.surfaces.limit_mm`."""
+
+
+def _give(source: Source, request: SurfaceRequest, _progress: Progress) -> SurfaceResult:
+    start, member = time.perf_counter(), source.who(request.atlas, request.person).member
+    assert member is not None
+    is_exact, scan = request.resolution >= EXACT_RESOLUTION, member.scan
+    colouring = _distances(member, request.values) if is_exact else None
+    return SurfaceResult(
+        request=request,
+        points_mm=scan.points_mm,
+        normals=scan.normals,
+        faces=scan.faces,
+        volume_cm3=scan.volume_cm3 or 0.0,
+        seconds=time.perf_counter() - start,
+        origin=Origin.MEASURED,
+        colouring=colouring,
+    )
+
+
+def _distances(member: Member, values: Named) -> Colouring:
+    """How far the scan is from the person's shape at ``values``, at its vertices; positive outside."""
+    atlas, latent = member.atlas_model, member.at(values).latent
+    found = atlas.sdf(member.scan.points_mm, dict(values), latent)
+    return Colouring(found.astype(np.float32), limit_mm(atlas, SHARE), "signed")
+
+
+ANSWER = Answer(_give)

@@ -1,0 +1,101 @@
+"""What a kind of view must say of itself.
+
+A kind is a value in a file of its own, named in :mod:`~naisr_viewer.panels.kinds`; how its request is
+answered says the file of the same name under ``engine/answers``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from naisr_viewer.state.atlas_card import AtlasCard
+from naisr_viewer.state.explorer import ExplorerState
+from naisr_viewer.state.layouts import Layout, Panel
+from naisr_viewer.state.patients import Named
+from naisr_viewer.state.requests import Scale, SurfaceRequest, SurfaceResult
+from naisr_viewer.words.captions import DOUBTFUL, NO_SURFACE, UNSEEN, Caption
+
+Ask = Callable[[ExplorerState, Panel, int], SurfaceRequest]
+"""What a panel shows in a state, at so many cells along a side of the box; there is an atlas."""
+
+Measured = Callable[[SurfaceResult], Caption]
+"""What is told of a surface that is there and can be trusted."""
+
+
+@dataclass(frozen=True)
+class PanelKind:
+    """A kind of view.
+
+    Attributes:
+        name: of the kind, in :attr:`~naisr_viewer.state.layouts.Panel.kind`.
+        title: what stands above the sub-plot; ``{covariate}`` stands for the panel's covariate.
+        hint: what the sub-plot is, for who hovers over its title.
+        layouts: where it is on screen; the order is that of the registry.
+        ask: the request for it.
+        caption: what stands beneath a result.
+        colour: of a surface whose vertices have none of their own, ``#rrggbb``; that of the panel's
+            covariate when left out.
+        scale: of the numbers on its surface; None where it has none.
+        unit: of those numbers.
+        covariates: whose panels there are, one for each name; one of no covariate when left out.
+        is_possible: whether an atlas can show it.
+    """
+
+    name: str
+    title: str
+    hint: str
+    layouts: frozenset[Layout]
+    ask: Ask
+    caption: Callable[[ExplorerState, SurfaceResult], Caption]
+    colour: str = ""
+    scale: Scale | None = None
+    unit: str = "mm"
+    covariates: Callable[[AtlasCard], tuple[str, ...]] = lambda _: ("",)
+    is_possible: Callable[[AtlasCard], bool] = lambda _: True
+
+    def panels(self, atlas: AtlasCard) -> tuple[Panel, ...]:
+        """All of this kind that an atlas can show."""
+        names = self.covariates(atlas) if self.is_possible(atlas) else ()
+        return tuple(Panel(self.name, name) for name in names)
+
+
+def ask_full_shape(state: ExplorerState, panel: Panel, resolution: int) -> SurfaceRequest:
+    """For what depends on all covariates and on the person who is shown."""
+    return asked(state, panel, resolution, state.named, state.person)
+
+
+def asked(
+    state: ExplorerState,
+    panel: Panel,
+    resolution: int,
+    values: Named,
+    person: int,
+    before: tuple[int, Named] | None = None,
+) -> SurfaceRequest:
+    """A request to the open atlas, see :class:`~naisr_viewer.state.requests.SurfaceRequest`."""
+    assert state.atlas is not None
+    return SurfaceRequest(state.atlas.path, panel, values, resolution, person, before)
+
+
+def caption_of(
+    measured: Measured, doubtful: Caption = DOUBTFUL
+) -> Callable[[ExplorerState, SurfaceResult], Caption]:
+    """A caption that also says whether there is a surface, and whether to believe it.
+
+    Args:
+        measured: of a surface.
+        doubtful: said where the deformation folds.
+    """
+
+    def caption(state: ExplorerState, result: SurfaceResult) -> Caption:
+        assert state.atlas is not None
+        if len(result.faces) == 0:
+            return NO_SURFACE
+        if result.doubtful:
+            return doubtful.beneath(measured(result))
+        if state.atlas.population.has_data_at(dict(result.request.values)):
+            return measured(result)
+        return UNSEEN.beneath(measured(result))
+
+    return caption

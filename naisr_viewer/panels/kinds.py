@@ -1,0 +1,86 @@
+"""All kinds of views, in the order in which they stand on screen, and what follows from that."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from naisr_viewer.panels import before, change, effect, scan, shape, template, uncertainty
+from naisr_viewer.panels.base import PanelKind
+from naisr_viewer.state.atlas_card import AtlasCard
+from naisr_viewer.state.explorer import ExplorerState
+from naisr_viewer.state.layouts import FULL_SHAPE, Layout, Panel
+from naisr_viewer.state.requests import SurfaceRequest, SurfaceResult
+from naisr_viewer.words.captions import Caption
+from naisr_viewer.words.titles import label
+
+KINDS: dict[str, PanelKind] = {
+    kind.name: kind
+    for kind in (
+        template.KIND,
+        effect.KIND,
+        before.KIND,
+        shape.KIND,
+        scan.KIND,
+        uncertainty.KIND,
+        change.KIND,
+    )
+}
+"""By name. A new kind is one line here and one among the answers of the engine; a script may add its own to
+both before it makes a window."""
+
+
+def kind_of(panel: Panel) -> PanelKind:
+    """What a panel says of itself."""
+    return KINDS[panel.kind]
+
+
+def title_of(panel: Panel) -> str:
+    """What stands above a sub-plot."""
+    return kind_of(panel).title.format(covariate=label(panel.covariate))
+
+
+def caption_of(state: ExplorerState, result: SurfaceResult) -> Caption:
+    """What stands beneath a result."""
+    return kind_of(result.request.panel).caption(state, result)
+
+
+def all_panels(atlas: AtlasCard) -> tuple[Panel, ...]:
+    """Whatever an atlas can show."""
+    return tuple(panel for kind in KINDS.values() for panel in kind.panels(atlas))
+
+
+def panels_in(layout: Layout, atlas: AtlasCard) -> tuple[Panel, ...]:
+    """What an atlas shows in a layout, in the order on screen."""
+    return tuple(panel for panel in all_panels(atlas) if layout in kind_of(panel).layouts)
+
+
+def layouts_of(atlas: AtlasCard) -> tuple[Layout, ...]:
+    """The layouts in which an atlas has more to show than its full shape, and that one."""
+    alone = (FULL_SHAPE,)
+    return tuple(each for each in Layout if each is Layout.FULL_SHAPE or panels_in(each, atlas) != alone)
+
+
+def visible_panels(state: ExplorerState) -> tuple[Panel, ...]:
+    """The panels of the present layout; none without an atlas."""
+    return () if state.atlas is None else panels_in(state.layout, state.atlas)
+
+
+def request_for(state: ExplorerState, panel: Panel, resolution: int) -> SurfaceRequest:
+    """The surface that ``panel`` shows in ``state``; there is an atlas."""
+    return kind_of(panel).ask(state, panel, resolution)
+
+
+def answers(result: SurfaceResult | None, request: SurfaceRequest) -> bool:
+    """Whether ``result`` shows what ``request`` asks for, at least as finely."""
+    if result is None or result.request.resolution < request.resolution:
+        return False
+    return replace(result.request, resolution=request.resolution) == request
+
+
+def missing(
+    state: ExplorerState, shown: Mapping[Panel, SurfaceResult], resolution: int
+) -> list[SurfaceRequest]:
+    """What ``state`` wants at ``resolution`` and is not among ``shown`` yet, the full shape first."""
+    wanted = [request_for(state, panel, resolution) for panel in reversed(visible_panels(state))]
+    return [request for request in wanted if not answers(shown.get(request.panel), request)]

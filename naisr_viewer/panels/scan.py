@@ -1,0 +1,43 @@
+"""A patient's scan, with its distance to the full shape."""
+
+import numpy as np
+
+from naisr_viewer.panels.base import PanelKind, ask_full_shape
+from naisr_viewer.state.explorer import ExplorerState
+from naisr_viewer.state.layouts import Layout
+from naisr_viewer.state.requests import SurfaceResult
+from naisr_viewer.words.captions import Caption, beyond, large
+from naisr_viewer.words.numbers import volume
+
+HINT = (
+    "Distance of the scan to the full shape along its normal, in mm, to first order: "
+    "positive where the scan lies outside the shape."
+)
+
+
+def _caption(state: ExplorerState, result: SurfaceResult) -> Caption:
+    scan = state.shown.scan if state.shown else None
+    own = "open surface" if scan is None or scan.volume_cm3 is None else volume(scan.volume_cm3)
+    return Caption(large(own) + _mean_distance(result), HINT)
+
+
+def _mean_distance(result: SurfaceResult) -> str:
+    if result.colouring is None:
+        return ""
+    mean_mm = np.abs(result.colouring.values).mean()
+    return f"<br>mean distance {mean_mm:.2f} mm{beyond(result.colouring)}"
+
+
+KIND = PanelKind(
+    name="scan",
+    title="Scan",
+    hint=(
+        "The patient's scan, coloured by its distance to the full shape in mm:\n"
+        "orange where the scan lies outside the shape (+), blue where it lies inside (−)."
+    ),
+    layouts=frozenset({Layout.FIT}),
+    ask=ask_full_shape,
+    caption=_caption,
+    colour="#b9b2a6",
+    scale="signed",
+)

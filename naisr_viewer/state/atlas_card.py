@@ -1,0 +1,40 @@
+"""What the window knows of an open atlas."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from naisr_model.capabilities import Capabilities
+from naisr_model.covariates import Covariate, Population
+
+RealVector = tuple[float, ...]
+"""Real covariate values in the atlas's covariate order."""
+
+
+@dataclass(frozen=True)
+class AtlasCard:
+    """All that the window needs to know of an open atlas.
+
+    Attributes:
+        path: the file it was read from.
+        name: for example ``airway``.
+        covariates: the sliders, in order; none where the shape model depends on none.
+        population: real values of the subjects behind the atlas, for the histograms.
+        capabilities: what its shape model can do; what it cannot do is absent from the window.
+    """
+
+    path: Path
+    name: str
+    covariates: tuple[Covariate, ...]
+    population: Population
+    capabilities: Capabilities
+
+    @property
+    def centre(self) -> RealVector:
+        """The population mean, where every slider starts."""
+        return tuple(covariate.centre for covariate in self.covariates)
+
+    def index(self, name: str) -> int:
+        """Position of a covariate; ``ValueError`` for an unknown name."""
+        return [covariate.name for covariate in self.covariates].index(name)

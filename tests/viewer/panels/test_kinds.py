@@ -1,0 +1,59 @@
+"""What each kind of view says of itself."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from naisr_viewer.engine.answers.kinds import ANSWERS
+from naisr_viewer.panels.kinds import (
+    KINDS,
+    answers,
+    layouts_of,
+    panels_in,
+    title_of,
+    visible_panels,
+)
+from naisr_viewer.state.atlas_card import AtlasCard
+from naisr_viewer.state.explorer import ExplorerState, opened
+from naisr_viewer.state.layouts import FULL_SHAPE, TEMPLATE, Layout, Panel
+from naisr_viewer.state.requests import SurfaceRequest
+from naisr_viewer.words.titles import label
+
+
+def ask(atlas: AtlasCard, resolution: int = 128, age: float = 100.0) -> SurfaceRequest:
+    return SurfaceRequest(atlas.path, FULL_SHAPE, (("age", age),), resolution)
+
+
+def test_every_kind_is_answered_and_every_answer_is_asked_for():
+    assert set(KINDS) == set(ANSWERS)
+
+
+def test_every_kind_has_a_colour_a_hint_and_a_place(card):
+    for panel in panels_in(Layout.SIDE_BY_SIDE, card):
+        kind = KINDS[panel.kind]
+        assert kind.hint and kind.layouts and (kind.colour or panel.covariate)
+
+
+def test_panels_are_named_for_people(card):
+    titles = [title_of(panel) for panel in panels_in(Layout.SIDE_BY_SIDE, card)]
+    assert titles == ["Template", "Age only", "Weight only", "Sex only", "Full shape"]
+    assert label("body_weight") == "Body weight"
+    assert title_of(Panel("effect", "{x} <b>")) == "{x} <b> only"
+
+
+def test_layouts_show_their_panels_in_order(card):
+    assert layouts_of(card) == tuple(Layout)
+    assert panels_in(Layout.FULL_SHAPE, card) == (FULL_SHAPE,)
+    assert panels_in(Layout.CHANGE, card) == (Panel("before"), FULL_SHAPE, Panel("change"))
+    assert panels_in(Layout.SIDE_BY_SIDE, card)[0] == TEMPLATE
+    state = opened(ExplorerState(), card)
+    assert visible_panels(replace(state, layout=Layout.FULL_SHAPE)) == (FULL_SHAPE,)
+    assert visible_panels(ExplorerState()) == ()
+
+
+def test_a_finer_surface_answers_a_coarser_question(engine, card):
+    fine = engine.surface(ask(card, age=50.0))
+    assert answers(fine, ask(card, resolution=40, age=50.0))
+    assert not answers(fine, ask(card, resolution=256, age=50.0))
+    assert not answers(fine, ask(card, resolution=40, age=51.0))
+    assert not answers(None, ask(card))
