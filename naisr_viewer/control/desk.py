@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import count
 from pathlib import Path
 
-from PySide6.QtCore import QFileSystemWatcher, QObject
+from PySide6.QtCore import QObject
 
-from naisr_viewer.control.controller import Controller, Task
-from naisr_viewer.control.worker import Deliver
+from naisr_viewer.control import jobs
+from naisr_viewer.control.controller import Controller
+from naisr_viewer.control.watch import FileWatch, Stamp, stamp_of
 from naisr_viewer.engine.clinic import Clinic
-from naisr_viewer.state.explorer import Layout, label, showing, with_patient, without_patient
-from naisr_viewer.state.patients import Fitted, Labels, Named, Patient, Reading, Scan
-from naisr_viewer.state.requests import Progress, ShouldStop
+from naisr_viewer.state.explorer import showing, with_patient, without_patient
+from naisr_viewer.state.layouts import Layout
+from naisr_viewer.state.patients import Fitted, Labels, Named, OpenScan, Reading, Scan
 from naisr_viewer.views.main_window import MainWindow
-
-Stamp = tuple[int, int] | None
-"""When a file was written (ns) and its size; None where there is none."""
+from naisr_viewer.words.titles import label
 
 
 @dataclass(frozen=True)
@@ -36,25 +36,6 @@ class Order:
     known: Named
 
 
-@dataclass(frozen=True, eq=False)
-class Read:
-    """A scan that was read as ordered, or a choice of labels that stands before it."""
-
-    order: Order
-    stamp: Stamp
-    found: Scan | Labels
-
-
-@dataclass(frozen=True, eq=False)
-class Found:
-    """A fit of this patient that came to its end."""
-
-    key: int
-    scan: Scan
-    known: Named
-    fit: Fitted
-
-
 class PatientDesk(QObject):
     """Wires the patient panel.
 
@@ -70,12 +51,10 @@ class PatientDesk(QObject):
         self._keys = count(1)
         self._waiting: deque[Order] = deque()
         self._stamps: dict[int, Stamp] = {}
-        self._files = QFileSystemWatcher(self)
-        self._files.fileChanged.connect(self._look_at_files)
-        self._files.directoryChanged.connect(self._look_at_files)
-        controller.settled.connect(self._read_next)
-        controller.settled.connect(self._watch)
-        controller.produced.connect(self._produced)
+        self._files = FileWatch(self)
+        self._files.touched.connect(self._look_at_files)
+        controller.refinement.settled.connect(self._read_next)
+        controller.refinement.settled.connect(self._watch)
         window.scan_requested.connect(self.open)
         panel = window.patients
         panel.patient_chosen.connect(self.show)
@@ -124,16 +103,13 @@ class PatientDesk(QObject):
 
     def fit(self, known: Named) -> None:
         """Fit the atlas to the patient that is shown; covariates that are not known are inferred."""
-        state, clinic = self._controller.state, self._clinic
-        atlas, patient = state.atlas, state.shown
+        atlas, patient = self._controller.state.atlas, self._controller.state.shown
         if atlas is None or patient is None or self._is_refused(known):
             return
-
-        def job(deliver: Deliver, progress: Progress, should_stop: ShouldStop) -> None:
-            fit = clinic.fit(atlas.path, patient.scan, known, progress, should_stop)
-            deliver(Found(patient.key, patient.scan, known, fit))
-
-        self._controller.run(Task.FITTING, f"Fitting {patient.name} …", job)
+        job = jobs.fitting(self._clinic, atlas.path, patient.scan, known)
+        self._controller.refinement.run(
+            f"Fitting {patient.name} …", job, partial(self._show_fit, patient, known)
+        )
 
     def compare(self, key: int | None) -> None:
         """Count changes from another patient; None for this patient as fitted."""
@@ -149,8 +125,8 @@ class PatientDesk(QObject):
         assert atlas is not None
         for name, value in known:
             covariate = atlas.covariates[atlas.index(name)]
-            low, high = covariate.range
-            if not low <= value <= high:
+            if not covariate.contains(value):
+                low, high = covariate.range
                 self._window.show_error(
                     f"{label(name)} is {covariate.format(value)}; the atlas was made from {low:g} to "
                     f"{covariate.format(high)}. Correct it, or untick it to have it inferred."
@@ -164,34 +140,25 @@ class PatientDesk(QObject):
         self._read_next()
 
     def _read_next(self) -> None:
-        atlas, clinic = self._controller.state.atlas, self._clinic
-        if atlas is None or not self._waiting or self._controller.is_occupied:
+        atlas, refinement = self._controller.state.atlas, self._controller.refinement
+        if atlas is None or not self._waiting or refinement.is_occupied:
             return
         order = self._waiting.popleft()
+        path = order.reading.path
+        job = jobs.reading(self._clinic, atlas.path, order.reading, order.known)
+        refinement.run(f"Reading {path.name} …", job, partial(self._has_read, order, stamp_of(path)))
 
-        def job(deliver: Deliver, progress: Progress, should_stop: ShouldStop) -> None:
-            stamp = stamp_of(order.reading.path)
-            labels = clinic.labels(order.reading)
-            found = labels or clinic.read(atlas.path, order.reading, order.known, should_stop)
-            deliver(Read(order, stamp, found))
-
-        self._controller.run(Task.READING, f"Reading {order.reading.path.name} …", job)
-
-    def _produced(self, item: object) -> None:
-        if isinstance(item, Read) and isinstance(item.found, Labels):
-            label = self._window.ask_label(item.found)
-            if label is not None:
-                self._read(replace(item.order, reading=replace(item.order.reading, label=label)))
-        elif isinstance(item, Read) and isinstance(item.found, Scan):
-            self._show_read(item.order, item.stamp, item.found)
-        elif isinstance(item, Found):
-            self._show_fit(item)
+    def _has_read(self, order: Order, stamp: Stamp, found: Scan | Labels) -> None:
+        if isinstance(found, Scan):
+            self._show_read(order, stamp, found)
+        elif (chosen := self._window.ask_label(found)) is not None:
+            self._read(replace(order, reading=replace(order.reading, label=chosen)))
 
     def _show_read(self, order: Order, stamp: Stamp, scan: Scan) -> None:
         """A scan that was read differently has to be fitted again."""
         old = self._controller.state.find(order.key)
         name = old.name if old is not None else self._name(order.reading)
-        patient = Patient(order.key, name, order.reading, scan, order.known)
+        patient = OpenScan(order.key, name, order.reading, scan, order.known)
         self._stamps[order.key] = stamp
         self._controller.go(with_patient(self._controller.state, patient))
         if old is not None and old.fit is not None:
@@ -199,12 +166,13 @@ class PatientDesk(QObject):
         self._watch()
         self._look_at_files()
 
-    def _show_fit(self, found: Found) -> None:
-        patient = self._controller.state.find(found.key)
-        if patient is None or patient.scan is not found.scan:
-            self._clinic.forget(found.fit)
+    def _show_fit(self, fitted: OpenScan, known: Named, fit: Fitted) -> None:
+        """A fit that came to its end, unless its patient was closed or read differently meanwhile."""
+        patient = self._controller.state.find(fitted.key)
+        if patient is None or patient.scan is not fitted.scan:
+            self._clinic.forget(fit)
             return
-        state = with_patient(self._controller.state, replace(patient, known=found.known, fit=found.fit))
+        state = with_patient(self._controller.state, replace(patient, known=known, fit=fit))
         layout = Layout.FIT if patient.fit is None else state.layout
         self._controller.go(replace(state, layout=layout))
         if patient.fit is not None:
@@ -224,14 +192,8 @@ class PatientDesk(QObject):
         return plain if plain not in names else next(name for name in numbered if name not in names)
 
     def _watch(self) -> None:
-        """Be told when another program writes one of the files; a new file is news of its folder."""
-        paths = {each.reading.path for each in self._controller.state.patients}
-        wanted = {str(place) for path in paths for place in (path, path.parent) if place.exists()}
-        watched = {*self._files.files(), *self._files.directories()}
-        if watched - wanted:
-            self._files.removePaths(list(watched - wanted))
-        if wanted - watched:
-            self._files.addPaths(list(wanted - watched))
+        """Be told when another program writes one of the files."""
+        self._files.watch(each.reading.path for each in self._controller.state.patients)
 
     def _look_at_files(self) -> None:
         state = self._controller.state
@@ -242,12 +204,3 @@ class PatientDesk(QObject):
         if [each.is_changed for each in patients] != [each.is_changed for each in state.patients]:
             self._controller.go(replace(state, patients=patients))
         self._watch()
-
-
-def stamp_of(path: Path) -> Stamp:
-    """What changes when a file is written."""
-    try:
-        facts = path.stat()
-    except OSError:
-        return None
-    return facts.st_mtime_ns, facts.st_size

@@ -1,4 +1,4 @@
-"""What the worker is given to do with an atlas that is shown; every job is made with all it needs."""
+"""What the workers are given to do; every job is made with all it needs."""
 
 from __future__ import annotations
 
@@ -6,11 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from naisr_model.progress import Progress
 from naisr_viewer.control.worker import Deliver, Job
+from naisr_viewer.engine.clinic import Clinic
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.files import surfaces
+from naisr_viewer.panels.kinds import request_for
+from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState
-from naisr_viewer.state.requests import ExportChoice, Progress, ShouldStop, SurfaceRequest, request_for
+from naisr_viewer.state.patients import Fitted, Labels, Named, Reading, Scan
+from naisr_viewer.state.requests import ExportChoice, SurfaceRequest, SurfaceResult
+
+Surfaces = tuple[SurfaceResult, ...]
 
 
 @dataclass(frozen=True)
@@ -27,38 +34,38 @@ class ExportReport:
         return f"Exported {surfaces} as {self.choice.format.upper()} to {self.choice.folder}"
 
 
-def opening(engine: Engine, path: Path) -> Job:
+def opening(engine: Engine, path: Path) -> Job[AtlasCard]:
     """Reads an atlas; hands over its card."""
-    return lambda deliver, _progress, _should_stop: deliver(engine.open(path))
+    return lambda deliver, _progress: deliver(engine.open(path))
 
 
-def frame(engine: Engine, requests: Sequence[SurfaceRequest]) -> Job:
+def frame(engine: Engine, requests: Sequence[SurfaceRequest]) -> Job[Surfaces]:
     """All surfaces of one moment, handed over together so that they are painted together."""
-    return lambda deliver, _progress, should_stop: deliver(
-        tuple(engine.surface(request, None, should_stop) for request in requests)
+    return lambda deliver, progress: deliver(
+        tuple(engine.surface(request, progress.quiet) for request in requests)
     )
 
 
-def one_by_one(engine: Engine, requests: Sequence[SurfaceRequest]) -> Job:
+def one_by_one(engine: Engine, requests: Sequence[SurfaceRequest]) -> Job[Surfaces]:
     """Surfaces that are handed over one by one, because each takes a while."""
 
-    def job(deliver: Deliver, progress: Progress, should_stop: ShouldStop) -> None:
-        for place, request in enumerate(requests):
-            deliver((engine.surface(request, _part(progress, place, len(requests)), should_stop),))
+    def job(deliver: Deliver[Surfaces], progress: Progress) -> None:
+        for request, piece in progress.over(requests):
+            deliver((engine.surface(request, piece),))
 
     return job
 
 
-def exporting(engine: Engine, state: ExplorerState, choice: ExportChoice) -> Job:
+def exporting(engine: Engine, state: ExplorerState, choice: ExportChoice) -> Job[ExportReport]:
     """Writes surfaces at the values of ``state``, computing what is missing; hands over a report."""
     atlas = state.atlas
     assert atlas is not None
     requests = [request_for(state, panel, choice.resolution) for panel in choice.panels]
 
-    def job(deliver: Deliver, progress: Progress, should_stop: ShouldStop) -> None:
-        for place, request in enumerate(requests):
+    def job(deliver: Deliver[ExportReport], progress: Progress) -> None:
+        for request, piece in progress.over(requests):
             owner = state.shown if request.person else None
-            result = engine.surface(request, _part(progress, place, len(requests)), should_stop)
+            result = engine.surface(request, piece)
             path = choice.folder / f"{surfaces.file_stem(atlas, result, owner)}.{choice.format}"
             surfaces.write_surface(path, result, atlas, owner)
         deliver(ExportReport(len(requests), choice))
@@ -66,11 +73,18 @@ def exporting(engine: Engine, state: ExplorerState, choice: ExportChoice) -> Job
     return job
 
 
-def preparing(engine: Engine, path: Path, person: int) -> Job:
+def preparing(engine: Engine, path: Path, person: int) -> Job[None]:
     """Makes previews of a person fast; hands over nothing."""
-    return lambda _, progress, should_stop: engine.prepare_previews(path, person, progress, should_stop)
+    return lambda _deliver, progress: engine.prepare_previews(path, person, progress)
 
 
-def _part(progress: Progress, place: int, count: int) -> Progress:
-    """Progress of one piece as progress of the whole."""
-    return lambda fraction: progress((place + fraction) / count)
+def reading(clinic: Clinic, atlas: Path, wanted: Reading, known: Named) -> Job[Scan | Labels]:
+    """Reads a patient's file; hands over the scan, or the labels that are to be chosen from first."""
+    return lambda deliver, progress: deliver(
+        clinic.labels(wanted) or clinic.read(atlas, wanted, known, progress)
+    )
+
+
+def fitting(clinic: Clinic, atlas: Path, scan: Scan, known: Named) -> Job[Fitted]:
+    """Fits an open atlas to a scan."""
+    return lambda deliver, progress: deliver(clinic.fit(atlas, scan, known, progress))

@@ -11,20 +11,22 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from threading import Condition, Thread
-from typing import Any
+from typing import Any, TypeVar
 
 from PySide6.QtCore import QObject, QTimer, Signal, Slot
 
-from naisr_viewer.state.requests import Progress, ShouldStop
+from naisr_model.progress import Progress
 
 REPORT_INTERVAL_S = 0.05
 """Progress reports closer together than this are left out."""
 
-Deliver = Callable[[object], None]
-"""Hands a result over to the window's thread."""
+Result = TypeVar("Result")
 
-Job = Callable[[Deliver, Progress, ShouldStop], None]
-"""Work to be done off the window's thread."""
+Deliver = Callable[[Result], None]
+"""Hands a result over to whoever asked for it, on the window's thread."""
+
+Job = Callable[[Deliver[Result], Progress], None]
+"""Work to be done off the window's thread; it may hand over several results."""
 
 
 class Worker(QObject):
@@ -35,7 +37,6 @@ class Worker(QObject):
         synchronous: run every job inside ``submit``, for tests.
     """
 
-    delivered = Signal(object)  # a job that is not stale handed over a result
     progressed = Signal(float)  # fraction 0..1 of the running job
     failed = Signal(object)  # a job that is not stale raised this exception
     idle = Signal()  # the last job ended, whichever way, and none waits
@@ -48,7 +49,7 @@ class Worker(QObject):
         self._oldest_valid = 0
         self._started = 0
         self._running = False
-        self._waiting: tuple[int, Job] | None = None
+        self._waiting: tuple[int, Job[Any], Deliver[Any]] | None = None
         self._closed = False
         self._changed = Condition()
         self._reported.connect(self._relay)
@@ -56,13 +57,18 @@ class Worker(QObject):
         if self._thread is not None:
             self._thread.start()
 
-    def submit(self, job: Job) -> None:
-        """Run ``job`` next; a job that still waits is forgotten."""
+    def submit(self, job: Job[Result], then: Deliver[Result]) -> None:
+        """Run ``job`` next; a job that still waits is forgotten.
+
+        Args:
+            job: what to do.
+            then: given each of its results, unless it is stale by then.
+        """
         with self._changed:
             if self._closed:
                 return
             self._generation += 1
-            self._waiting = (self._generation, job)
+            self._waiting = (self._generation, job, then)
             self._changed.notify()
         if self._thread is None:
             self._run_waiting()
@@ -100,20 +106,19 @@ class Worker(QObject):
         with self._changed:
             if self._waiting is None:
                 return
-            (generation, job), self._waiting = self._waiting, None
+            (generation, job, then), self._waiting = self._waiting, None
             self._started, self._running = generation, True
         try:
             job(
-                lambda result: self._reported.emit(generation, "delivered", result),
-                self._thinned(generation),
-                lambda: self._is_stale(generation),
+                lambda result: self._reported.emit(generation, "delivered", (then, result)),
+                Progress(self._thinned(generation), lambda: self._is_stale(generation)),
             )
         except Exception as error:  # whatever it is, the user is told in the window
             self._reported.emit(generation, "failed", error)
         self._running = False
         self._reported.emit(generation, "idle", None)
 
-    def _thinned(self, generation: int) -> Progress:
+    def _thinned(self, generation: int) -> Callable[[float], None]:
         last = time.monotonic()
 
         def report(fraction: float) -> None:
@@ -131,5 +136,10 @@ class Worker(QObject):
         if signal == "idle":
             if self._waiting is None and generation == self._started:
                 self.idle.emit()
-        elif not self._is_stale(generation):
+        elif self._is_stale(generation):
+            return
+        elif signal == "delivered":
+            then, result = payload
+            then(result)
+        else:
             getattr(self, signal).emit(payload)

@@ -1,4 +1,4 @@
-"""Surfaces to files in millimetres, each with a record of what it is beside it. No Qt."""
+"""Surfaces to files in millimetres, each with a record of what it is beside it."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from naisr_model.covariates import Covariate
 from naisr_model.errors import InputError
 from naisr_model.files import replacing
 from naisr_viewer import __version__
-from naisr_viewer.state.explorer import AtlasCard, Covariate, panel_title
-from naisr_viewer.state.patients import Patient
+from naisr_viewer.panels.kinds import title_of
+from naisr_viewer.state.atlas_card import AtlasCard
+from naisr_viewer.state.patients import OpenScan
 from naisr_viewer.state.requests import FORMATS, SurfaceResult
 
 
@@ -31,7 +33,7 @@ def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
 
 
 def write_surface(
-    path: Path, result: SurfaceResult, atlas: AtlasCard, patient: Patient | None = None
+    path: Path, result: SurfaceResult, atlas: AtlasCard, patient: OpenScan | None = None
 ) -> tuple[Path, Path]:
     """Write a surface and, beside it, a JSON record of what it shows.
 
@@ -48,9 +50,7 @@ def write_surface(
         InputError: when there is no surface to write, or the ending or folder will not do.
     """
     if len(result.faces) == 0:
-        raise InputError(
-            f"{panel_title(result.request.panel)} has no surface at these values; nothing to write"
-        )
+        raise InputError(f"{title_of(result.request.panel)} has no surface at these values; nothing to write")
     ending = path.suffix.lower().removeprefix(".")
     if ending not in FORMATS:
         raise InputError(f"cannot write '{path.name}'; the ending must be one of {', '.join(FORMATS)}")
@@ -62,7 +62,7 @@ def write_surface(
 
 
 def description(
-    result: SurfaceResult, atlas: AtlasCard, file_name: str, patient: Patient | None = None
+    result: SurfaceResult, atlas: AtlasCard, file_name: str, patient: OpenScan | None = None
 ) -> dict[str, Any]:
     """What a mesh file shows, as plain JSON."""
     request, margin = result.request, result.volume_margin_cm3
@@ -71,7 +71,7 @@ def description(
         "file": file_name,
         "atlas": atlas.name,
         "atlas_file": atlas.path.name,
-        "view": panel_title(request.panel),
+        "view": title_of(request.panel),
         "covariates": {c.name: _covariate_record(c, given.get(c.name, c.centre)) for c in atlas.covariates},
         "depends_on": sorted(given),
         "length_unit": "mm",
@@ -85,21 +85,21 @@ def description(
     }
 
 
-def file_stem(atlas: AtlasCard, result: SurfaceResult, patient: Patient | None = None) -> str:
+def file_stem(atlas: AtlasCard, result: SurfaceResult, patient: OpenScan | None = None) -> str:
     """A telling file name without an ending: ``airway-age-only``, ``airway-p01-full-shape``."""
     person = "" if patient is None else f"{_plain_name(patient)}-"
-    words = f"{atlas.name}-{person}{panel_title(result.request.panel)}".lower()
+    words = f"{atlas.name}-{person}{title_of(result.request.panel)}".lower()
     return "-".join(words.replace("/", " ").split())
 
 
-def _plain_name(patient: Patient) -> str:
+def _plain_name(patient: OpenScan) -> str:
     """The name without the file's ending and without parentheses: ``p01.stl (2)`` is ``p01 2``."""
     file = patient.reading.path.name
     stem = file.removesuffix(".gz").rpartition(".")[0] or file
     return patient.name.replace(file, stem).replace("(", "").replace(")", "")
 
 
-def _patient_record(patient: Patient) -> dict[str, Any]:
+def _patient_record(patient: OpenScan) -> dict[str, Any]:
     """Who it is, and what of the covariates is known of them; the rest was inferred."""
     fit = patient.fit
     return {
@@ -107,7 +107,7 @@ def _patient_record(patient: Patient) -> dict[str, Any]:
         "known": dict(patient.known),
         "fitted": None if fit is None else dict(fit.values),
         "residual_mm": None if fit is None else round(fit.residual_mm, 4),
-        "lasting": None if fit is None else round(fit.lasting, 4),
+        "lasting": None if fit is None or fit.lasting is None else round(fit.lasting, 4),
     }
 
 

@@ -12,7 +12,8 @@ from PySide6.QtTest import QTest
 from naisr_model.errors import InputError
 from naisr_viewer.control.controller import Controller
 from naisr_viewer.files import surfaces
-from naisr_viewer.state.explorer import FULL_SHAPE, Layout, all_panels
+from naisr_viewer.panels.kinds import panels_in
+from naisr_viewer.state.layouts import FULL_SHAPE, Layout
 from naisr_viewer.state.requests import EXACT_RESOLUTION, ExportChoice
 from naisr_viewer.views.covariates.row import CovariateRow
 from naisr_viewer.views.covariates.slider import SLIDER_STEPS
@@ -100,7 +101,8 @@ def run_demo(window: MainWindow, controller: Controller, folder: Path) -> None:
     picture("full-shape")
     atlas = controller.state.atlas
     assert atlas is not None
-    controller.export(ExportChoice(all_panels(atlas), "stl", EXACT_RESOLUTION, folder))
+    everything = panels_in(Layout.SIDE_BY_SIDE, atlas)
+    controller.export(ExportChoice(everything, "stl", EXACT_RESOLUTION, folder))
     finish(window, controller)
     row.reset.click()
     window.scan_requested.emit(folder / f"{surfaces.file_stem(atlas, controller.shown[FULL_SHAPE])}.stl")

@@ -33,7 +33,9 @@ from naisr_model.errors import InputError
 from naisr_viewer.control.controller import Controller
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.files.surfaces import write_atomically
-from naisr_viewer.state.explorer import FULL_SHAPE, Panel, panel_values, visible_panels
+from naisr_viewer.panels.kinds import request_for, visible_panels
+from naisr_viewer.state.layouts import FULL_SHAPE, Panel
+from naisr_viewer.state.requests import EXACT_RESOLUTION
 from naisr_viewer.views.covariates.row import CovariateRow
 from naisr_viewer.views.covariates.slider import slider_value
 from naisr_viewer.views.main_window import MainWindow
@@ -140,7 +142,7 @@ class Observer:
         return state.atlas is not None and all(
             panel in shown
             and shown[panel].is_exact
-            and shown[panel].request.values == panel_values(state, panel)
+            and shown[panel].request == request_for(state, panel, EXACT_RESOLUTION)
             for panel in visible_panels(state)
         )
 
@@ -165,8 +167,10 @@ def measure(
     first = observer.complete_since(0.0)
     if first is None or observer.appeared is None or controller.state.atlas is None:
         raise InputError(window.error_text.text() or f"no picture within {PATIENCE_S:g} s")
-    atlas = controller.state.atlas.path
-    ready = _wait(lambda: engine.has_previews(atlas), PREVIEWS_S)
+    card, atlas = controller.state.atlas, controller.state.atlas.path
+    if not card.covariates:
+        raise InputError(f"the shapes of {atlas.name} depend on no covariate, so no slider can be dragged")
+    ready = card.capabilities.trackable and _wait(lambda: engine.has_previews(atlas), PREVIEWS_S)
     previews_ready_s = time.monotonic() - started if ready else None
     observer.name, row = next(iter(window.covariates.rows.items()))
     _leave_the_centre(controller, observer)

@@ -18,6 +18,7 @@ from naisr_model import __version__
 from naisr_model.errors import InputError
 from naisr_viewer import app
 from naisr_viewer.engine.engine import Engine
+from naisr_viewer.program import start
 
 ROOT = Path(__file__).parents[2]
 DISPLAY = ("DISPLAY", "WAYLAND_DISPLAY")
@@ -81,7 +82,7 @@ def test_an_unknown_option_is_one_sentence_and_code_2(capsys):
 
 
 def test_a_bad_setting_ends_the_program_with_code_2(capsys, engine, atlas_file, monkeypatch):
-    monkeypatch.setattr(app, "Engine", lambda _: engine)
+    monkeypatch.setattr(start, "make_engine", lambda _: engine)
     assert app.main([str(atlas_file), "--set", "age=500"]) == 2
     assert "1 to 220 months" in capsys.readouterr().err
 
@@ -153,11 +154,10 @@ def test_the_second_start_paints_the_first_picture_before_the_networks_are_impor
         f"""
         import sys
         from pathlib import Path
-        from naisr_viewer import app
         from naisr_viewer.engine import engine
-        from naisr_viewer.program import headless
+        from naisr_viewer.program import headless, start
         from naisr_viewer.program.display import ensure_display
-        from naisr_viewer.state.explorer import visible_panels
+        from naisr_viewer.panels.kinds import visible_panels
 
         def note(_count):
             shown = [controller.shown.get(panel) for panel in visible_panels(controller.state)]
@@ -165,10 +165,11 @@ def test_the_second_start_paints_the_first_picture_before_the_networks_are_impor
                 pictures.append({{"torch", "trimesh", "scipy", "igl"}} & set(sys.modules))
 
         ensure_display((800, 600))
-        application, pictures, opened = app.make_application(), [], engine.Engine(folder=Path({str(cache)!r}))
-        window, controller = app.make_window(opened, Path({str(tmp_path / "settings.ini")!r}))
+        opened = engine.Engine(folder=Path({str(cache)!r}))
+        application, pictures = start.make_application(), []
+        window, controller = start.make_window(opened, Path({str(tmp_path / "settings.ini")!r}))
         window.shapes.drawn.connect(note)
-        app._show(window, controller, Path({str(egg_atlas)!r}), None, {{}}, (800, 600))
+        start.show(window, controller, start.First(Path({str(egg_atlas)!r})), (800, 600))
         headless.wait_until(lambda: bool(pictures), 60)
         headless.wait_until(lambda: opened.has_previews(controller.state.atlas.path), 60)
         window.close()
@@ -195,7 +196,7 @@ def test_without_display_a_window_for_a_person_is_refused_in_words(no_display, c
 def test_without_display_and_xvfb_the_remedy_is_named(
     no_display, capsys, engine, atlas_file, monkeypatch, tmp_path
 ):
-    monkeypatch.setattr(app, "Engine", lambda _: engine)
+    monkeypatch.setattr(start, "make_engine", lambda _: engine)
     monkeypatch.setattr(shutil, "which", lambda _: None)
     assert app.main([str(atlas_file), "--screenshot", str(tmp_path / "x.png")]) == 2
     error = capsys.readouterr().err

@@ -12,16 +12,18 @@ from PySide6.QtGui import QImage
 
 from naisr_model import __version__
 from naisr_model.errors import InputError
+from naisr_model.progress import Progress
 from naisr_viewer.control.controller import Controller
+from naisr_viewer.control.preferences import Preferences
 from naisr_viewer.control.worker import Worker
-from naisr_viewer.state.explorer import FULL_SHAPE, TEMPLATE, Layout, Panel, all_panels
+from naisr_viewer.panels.kinds import panels_in, request_for
+from naisr_viewer.state.layouts import FULL_SHAPE, TEMPLATE, Layout, Panel
 from naisr_viewer.state.requests import (
     EXACT_RESOLUTION,
     PREVIEW_RESOLUTION,
     ExportChoice,
     Origin,
     SurfaceResult,
-    request_for,
 )
 from naisr_viewer.state.theme import ThemeChoice
 from naisr_viewer.views.covariates.panel import CovariatePanel
@@ -75,7 +77,9 @@ def window(qapp: QObject) -> Mock:
 
 @pytest.fixture
 def controller(window, engine, settings) -> Controller:
-    return Controller(window, engine, Worker(synchronous=True), Worker(synchronous=True), settings)
+    return Controller(
+        window, engine, Worker(synchronous=True), Worker(synchronous=True), Preferences(settings)
+    )
 
 
 @pytest.fixture
@@ -98,7 +102,7 @@ def test_opening_shows_coarse_surfaces_first_and_exact_ones_at_last(controller, 
     controller.open(atlas_file)
     sizes = [result.request.resolution for result in drawn(window)]
     assert sizes == [PREVIEW_RESOLUTION] * 5 + [EXACT_RESOLUTION] * 5
-    assert set(controller.shown) == set(all_panels(card))
+    assert set(controller.shown) == set(panels_in(Layout.SIDE_BY_SIDE, card))
     assert status(window).startswith(f"Exact {EXACT_RESOLUTION}³ in ")
     assert not controller.is_busy
 
@@ -249,7 +253,9 @@ def test_errors_in_words():
 
 def test_export_writes_what_is_asked_for_even_out_of_view(ready, window, tmp_path, card):
     window.layout_requested.emit(Layout.FULL_SHAPE)
-    window.export_requested.emit(ExportChoice(all_panels(card), "ply", 64, tmp_path / "new folder"))
+    window.export_requested.emit(
+        ExportChoice(panels_in(Layout.SIDE_BY_SIDE, card), "ply", 64, tmp_path / "new folder")
+    )
     names = sorted(path.name for path in (tmp_path / "new folder").iterdir())
     views = ["age-only", "full-shape", "sex-only", "template", "weight-only"]
     assert names == sorted(f"ellipsoid-{view}.{ending}" for view in views for ending in ("json", "ply"))
@@ -282,7 +288,7 @@ def test_recent_files_and_theme_are_remembered(
     window.theme_requested.emit(ThemeChoice.DARK)
     settings.sync()
     again = QSettings(settings.fileName(), QSettings.Format.IniFormat)
-    Controller(window, engine, Worker(synchronous=True), Worker(synchronous=True), again)
+    Controller(window, engine, Worker(synchronous=True), Worker(synchronous=True), Preferences(again))
     window.show_recent.assert_called_with([atlas_file])
     window.show_theme.assert_called_with(ThemeChoice.DARK)
 
@@ -290,7 +296,6 @@ def test_recent_files_and_theme_are_remembered(
 class HeldWorker(QObject):
     """A worker whose one job runs when the test says so."""
 
-    delivered = Signal(object)
     progressed = Signal(float)
     failed = Signal(object)
     idle = Signal()
@@ -298,10 +303,11 @@ class HeldWorker(QObject):
     def __init__(self) -> None:
         super().__init__()
         self.job: Callable | None = None
+        self.then: Callable | None = None
         self.cancelled = 0
 
-    def submit(self, job: Callable) -> None:
-        self.job = job
+    def submit(self, job: Callable, then: Callable) -> None:
+        self.job, self.then = job, then
 
     def cancel(self) -> None:
         self.job = None
@@ -312,14 +318,14 @@ class HeldWorker(QObject):
     def run(self) -> None:
         job, self.job = self.job, None
         if job is not None:
-            job(self.delivered.emit, self.progressed.emit, lambda: False)
+            job(self.then, Progress(self.progressed.emit))
         self.idle.emit()
 
 
 @pytest.fixture
 def held(window, engine, settings, card) -> tuple[Controller, HeldWorker]:
     worker = HeldWorker()
-    controller = Controller(window, engine, worker, HeldWorker(), settings)  # type: ignore[arg-type]
+    controller = Controller(window, engine, worker, HeldWorker(), Preferences(settings))  # type: ignore[arg-type]
     controller.show_atlas(card)
     while worker.job is not None:
         worker.run()
@@ -353,7 +359,7 @@ def test_a_result_for_values_left_behind_is_not_shown_at_rest(held, window, engi
     window.covariates.value_moved.emit("age", 120.0)
     late = engine.surface(request_for(controller.state, AGE_ONLY, PREVIEW_RESOLUTION))
     window.covariates.value_settled.emit("age", 90.0)
-    worker.delivered.emit((late,))
+    worker.then((late,))
     assert controller.shown[AGE_ONLY].request.values != (("age", 120.0),)
     while worker.job is not None:
         worker.run()

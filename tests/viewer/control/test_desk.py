@@ -16,12 +16,17 @@ from PySide6.QtGui import QAction, QDropEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QFileDialog, QWidget
 
-from naisr_viewer.app import make_window
 from naisr_viewer.engine.engine import Engine
-from naisr_viewer.state.explorer import BEFORE, CERTAINTY, CHANGE, FULL_SHAPE, SCAN, TEMPLATE, Layout
+from naisr_viewer.program.start import make_window
+from naisr_viewer.state.layouts import FULL_SHAPE, TEMPLATE, Layout, Panel
 from naisr_viewer.state.requests import ExportChoice
 from naisr_viewer.views import main_window
 from naisr_viewer.words.numbers import gained, volume
+
+BEFORE = Panel("before")
+UNCERTAINTY = Panel("uncertainty")
+CHANGE = Panel("change")
+SCAN = Panel("scan")
 
 CUBIC_CM = egg(6.0, 1.0).volume / 1000
 
@@ -131,7 +136,7 @@ def test_a_fit_ends_at_the_patient_with_an_interval(fitted):
     assert state.fit.residual_mm < 0.5
     assert volume(state.fit.volume_cm3, state.fit.volume_margin_cm3) in window.shapes.caption(FULL_SHAPE)
     assert controller.shown[SCAN].colouring is not None
-    assert controller.shown[CERTAINTY].colouring is not None
+    assert controller.shown[UNCERTAINTY].colouring is not None
     assert "mean distance" in window.shapes.caption(SCAN)
 
 
@@ -159,7 +164,7 @@ def test_years_ahead_before_and_after(fitted, qtbot):
     before, after, change = (controller.shown[panel] for panel in (BEFORE, FULL_SHAPE, CHANGE))
     gain = (egg(8.5, 1.0).volume - egg(6.0, 1.0).volume) / 1000
     assert after.volume_cm3 - before.volume_cm3 == pytest.approx(gain, rel=0.2)
-    assert change.colouring.values_mm.max() == pytest.approx(5, abs=1.2)  # 2 mm a year at the poles
+    assert change.colouring.values.max() == pytest.approx(5, abs=1.2)  # 2 mm a year at the poles
     assert gained(change.volume_cm3, change.volume_before_cm3, change.volume_margin_cm3) in (
         window.shapes.caption(CHANGE)
     )
@@ -178,7 +183,7 @@ def test_dragging_follows_with_the_patients_own_code(fitted, qtbot, engine, egg_
     settle(qtbot, controller)
     change = controller.shown[CHANGE]
     assert not change.is_exact and change.request.person == person
-    assert change.colouring.values_mm.max() == pytest.approx(3, abs=1)
+    assert change.colouring.values.max() == pytest.approx(3, abs=1)
     controller.settle("age", 7.5)
     settle(qtbot, controller)
     assert controller.shown[CHANGE].is_exact
@@ -230,7 +235,7 @@ def test_a_stopped_fit_changes_nothing(ready, qtbot, scan_file):
     drop(window, scan_file)
     settle(qtbot, controller)
     click(window.patients.known.fit)
-    controller.cancel()
+    controller.refinement.cancel()
     settle(qtbot, controller)
     assert controller.state.fit is None and "Cancelled" in window.status.text()
     assert window.patients.known.fit.isEnabled() and not window.error_text.text()
@@ -299,7 +304,7 @@ def test_closing_a_patient_forgets_the_code(fitted, qtbot, engine):
     window.patients.close_requested.emit(controller.state.patients[0].key)
     settle(qtbot, controller)
     assert controller.state.patients == () and controller.state.person == 0
-    assert person not in engine._members
+    assert person not in engine.persons
 
 
 def test_an_export_says_whose_shape_it_is(fitted, qtbot, tmp_path):

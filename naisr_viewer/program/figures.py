@@ -1,0 +1,92 @@
+"""The pictures of the window in the documents: ``python -m naisr_viewer.program.figures FOLDER``.
+
+A child of the synthetic population that the atlas has never seen is written as a hospital would hand the scan
+over, opened in the window, moved onto the atlas by its landmarks, fitted, and carried three years ahead.
+"""
+
+from __future__ import annotations
+
+import csv
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from naisr_model.shipped import shipped_atlas
+from naisr_viewer.control.controller import Controller
+from naisr_viewer.program import start
+from naisr_viewer.program.display import ensure_display
+from naisr_viewer.program.headless import finish
+from naisr_viewer.state.layouts import Layout
+from naisr_viewer.state.patients import Named, Reading
+from naisr_viewer.views.main_window import MainWindow
+
+PIXELS = (1280, 800)
+SHOWN = {"age": 60.0, "weight": 19.0, "sex": -1.0}
+OTHER_SEED, AGE_MONTHS, LATER_MONTHS = 1000, 90.0, 36.0
+
+
+@dataclass(frozen=True)
+class Child:
+    """A scan as it comes: files in the frame of the scanner, and what is known of the child."""
+
+    mesh: Path
+    landmarks: Path
+    known: Named
+
+
+def main(folder: Path) -> None:
+    """Write ``window.png`` and ``patient.png`` into a folder."""
+    ensure_display(PIXELS)
+    engine = start.make_engine("cpu")
+    card = engine.open(shipped_atlas())
+    with TemporaryDirectory() as scans, start.own_window(engine) as (window, controller):
+        window.resize(*PIXELS)
+        window.show()
+        controller.show_atlas(card, SHOWN)
+        _picture(window, controller, folder / "window.png")
+        _fit(window, controller, _child(Path(scans)))
+        controller.set_follow(True)
+        controller.set_layout(Layout.CHANGE)
+        controller.settle("age", dict(controller.state.named)["age"] + LATER_MONTHS)
+        _picture(window, controller, folder / "patient.png")
+
+
+def _child(folder: Path) -> Child:
+    """Of ten new children the boy whose age is nearest to the one that is wanted."""
+    command = [sys.executable, "-m", "naisr_model.cli", "populate", "airway", str(folder)]
+    subprocess.run([*command, "--patients", "10", "--seed", str(OTHER_SEED)], check=True, capture_output=True)
+    (table,) = folder.glob("*.csv")
+    with table.open(newline="", encoding="utf-8") as file:
+        rows = [_plain(row) for row in csv.DictReader(file)]
+    boys = [row for row in rows if row["sex"] == "M"]
+    row = min(boys, key=lambda row: abs(float(row["age"]) - AGE_MONTHS))
+    known = (("age", float(row["age"])), ("weight", float(row["weight"])), ("sex", 1.0))
+    return Child(folder / row["mesh"], folder / row["landmarks"], known)
+
+
+def _plain(row: dict[str, str]) -> dict[str, str]:
+    """A row by the names of its columns, without their units."""
+    return {name.partition(" [")[0]: value for name, value in row.items()}
+
+
+def _fit(window: MainWindow, controller: Controller, child: Child) -> None:
+    """What a user does: open the scan, align it, say what is known, and fit."""
+    window.scan_requested.emit(child.mesh)
+    finish(window, controller)
+    window.patients.reading_changed.emit(Reading(child.mesh, align="landmarks", landmarks=child.landmarks))
+    finish(window, controller)
+    window.patients.known.give(child.known)
+    window.patients.known.fit.click()
+    finish(window, controller)
+
+
+def _picture(window: MainWindow, controller: Controller, path: Path) -> None:
+    finish(window, controller)
+    controller.save_screenshot(path)
+    print(f"wrote {path}")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

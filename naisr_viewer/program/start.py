@@ -1,0 +1,192 @@
+"""Starts the window: in the hands of a person, for pictures without one, or under a stop-watch.
+
+Qt is imported when it is needed, so that the command line answers at once.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+import signal
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+from naisr_model.errors import InputError
+from naisr_viewer.engine.atlases import load_atlas
+from naisr_viewer.engine.engine import Engine
+from naisr_viewer.program.display import ensure_display, has_display
+
+if TYPE_CHECKING:
+    from PySide6.QtWidgets import QApplication
+
+    from naisr_viewer.control.controller import Controller
+    from naisr_viewer.state.atlas_card import AtlasCard
+    from naisr_viewer.views.main_window import MainWindow
+
+
+@dataclass(frozen=True)
+class First:
+    """What the window shows first.
+
+    Attributes:
+        path: an atlas file.
+        card: of that atlas, where the engine has opened it already.
+        values: real covariate values by name, then; the others are at their mean.
+        scan: a patient's file to open.
+    """
+
+    path: Path
+    card: AtlasCard | None = None
+    values: Mapping[str, float] = field(default_factory=dict)
+    scan: Path | None = None
+
+
+def make_engine(device: str) -> Engine:
+    """What computes surfaces, on a machine that is set up for a window beside it."""
+    leave_a_core_to_the_window()
+    gc.set_threshold(50_000)  # imports make many objects that stay: seldom worth looking through
+    return Engine(partial(load_atlas, device=device))
+
+
+def leave_a_core_to_the_window() -> None:
+    """Bound the threads that compute surfaces, unless the user has; torch reads this when imported.
+
+    With a thread on every core the window and the computation wait for each other, and waiting threads
+    spin: on two busy cores a preview then takes several times as long.
+    """
+    os.environ.setdefault("OMP_NUM_THREADS", str(max(1, (os.cpu_count() or 2) - 1)))
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+
+
+def make_window(engine: Engine, settings_file: Path | None = None) -> tuple[MainWindow, Controller]:
+    """A window and what drives it; the application object exists already.
+
+    Args:
+        engine: computes the surfaces.
+        settings_file: an INI file for recent files and theme instead of the user's own settings.
+    """
+    from PySide6.QtCore import QSettings
+
+    from naisr_viewer.control.controller import Controller
+    from naisr_viewer.control.desk import PatientDesk
+    from naisr_viewer.control.preferences import Preferences
+    from naisr_viewer.control.worker import Worker
+    from naisr_viewer.engine.clinic import Clinic
+    from naisr_viewer.views.main_window import MainWindow
+
+    if settings_file is None:
+        settings = QSettings("naisr", "naisr-viewer")
+    else:
+        settings = QSettings(str(settings_file), QSettings.Format.IniFormat)
+    window = MainWindow()
+    controller = Controller(window, engine, Worker(), Worker(), Preferences(settings))
+    PatientDesk(window, controller, Clinic(engine))  # the controller owns it
+    return window, controller
+
+
+def make_application() -> QApplication:
+    """The one application object, styled alike on every platform."""
+    from PySide6.QtWidgets import QApplication
+
+    app = QApplication.instance() or QApplication(["naisr-viewer"])
+    assert isinstance(app, QApplication)
+    app.setApplicationName("naisr-viewer")
+    app.setStyle("Fusion")
+    return app
+
+
+def attended(engine: Engine, first: First, pixels: tuple[int, int]) -> int:
+    """The window in the hands of a person, until it is closed."""
+    from PySide6.QtCore import Qt
+
+    if not has_display():
+        raise InputError("there is no display; use --screenshot, --demo or --measure, which need none")
+    app = make_application()
+    window, controller = make_window(engine)
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # so that Ctrl+C in the terminal ends the program
+    if (scan := first.scan) is not None:
+        once = Qt.ConnectionType.SingleShotConnection
+        controller.refinement.settled.connect(lambda: window.scan_requested.emit(scan), once)
+    show(window, controller, first, pixels)
+    return app.exec()
+
+
+def show(window: MainWindow, controller: Controller, first: First, pixels: tuple[int, int]) -> None:
+    """Put the window on the screen first; what takes long starts behind it."""
+
+    def begin() -> None:
+        window.shapes.prepare()
+        if first.card is None:
+            controller.open(first.path)
+        else:
+            controller.show_atlas(first.card, first.values)
+
+    sys.excepthook = controller.report
+    window.resize(*pixels)
+    window.show_opening(first.path.name)
+    window.appeared.connect(begin)
+    window.show()
+
+
+def measured(engine: Engine, path: Path, pixels: tuple[int, int], file: Path, loaded: float) -> int:
+    """The window as a person starts and drags it, with a stop-watch, writing the figures to ``file``.
+
+    Args:
+        engine: computes the surfaces.
+        path: an atlas file.
+        pixels: size of the window.
+        file: JSON, to be written.
+        loaded: when the program was, on the monotonic clock.
+    """
+    before = time.monotonic()
+    ensure_display(pixels)
+    display_s = time.monotonic() - before  # whoever sits at a display does not wait for a virtual one
+    with own_window(engine) as (window, controller):
+        from naisr_viewer.program.measure import Observer, measure, process_start
+
+        observer = Observer(window, controller)
+        show(window, controller, First(path), pixels)
+        measure(window, controller, engine, observer, process_start(loaded) + display_s, file)
+    print(f"wrote {file}")
+    return 0
+
+
+def unattended(
+    engine: Engine, first: First, pixels: tuple[int, int], screenshot: Path | None, demo: Path | None
+) -> int:
+    """The same window without a person."""
+    from naisr_viewer.program import headless
+
+    assert first.card is not None
+    ensure_display(pixels)
+    with own_window(engine) as (window, controller):
+        window.resize(*pixels)
+        window.show()
+        controller.show_atlas(first.card, first.values)
+        if first.scan is not None:
+            headless.finish(window, controller)
+            window.scan_requested.emit(first.scan)
+        if screenshot is not None:
+            headless.take_screenshot(window, controller, screenshot)
+        if demo is not None:
+            headless.run_demo(window, controller, demo)
+    return 0
+
+
+@contextmanager
+def own_window(engine: Engine) -> Iterator[tuple[MainWindow, Controller]]:
+    """A window that leaves no trace in the user's settings, closed at the end."""
+    make_application()
+    with TemporaryDirectory(prefix="naisr-viewer-") as folder:
+        window, controller = make_window(engine, Path(folder) / "settings.ini")
+        try:
+            yield window, controller
+        finally:
+            window.close()

@@ -1,0 +1,90 @@
+"""An atlas whose shapes depend on no covariates and have no template, in the whole window."""
+
+from __future__ import annotations
+
+import dataclasses
+import gc
+from pathlib import Path
+
+import pytest
+from eggs import egg
+from PySide6.QtGui import QAction
+
+from naisr_model.config import SirenConfig
+from naisr_model.learning.training.loop import train
+from naisr_model.models.deepsdf import DeepSdfConfig
+from naisr_model.models.factory import preset
+from naisr_viewer.engine.engine import Engine
+from naisr_viewer.panels.kinds import all_panels, visible_panels
+from naisr_viewer.program.headless import finish
+from naisr_viewer.program.start import make_window
+from naisr_viewer.state.layouts import FULL_SHAPE, Layout
+
+TOLERATED = 0.06
+"""Share of a volume by which a code that was trained for some seconds may be off."""
+
+
+@pytest.fixture(scope="module")
+def deepsdf_atlas(egg_store, tmp_path_factory) -> Path:
+    demo = preset("deepsdf-demo")
+    network = DeepSdfConfig(latent=4, shape=SirenConfig(32, 2, omega0=5.0))
+    training = dataclasses.replace(demo.training, epochs=300, batch_shapes=10, template_rate=2e-3)
+    out = tmp_path_factory.mktemp("deepsdf") / "eggs.safetensors"
+    train(egg_store, dataclasses.replace(demo, network=network, training=training), out)
+    return out
+
+
+@pytest.fixture
+def ready(qtbot, deepsdf_atlas, tmp_path):
+    window, controller = make_window(Engine(folder=tmp_path / "cache"), tmp_path / "settings.ini")
+    window.resize(1280, 800)
+    window.show()
+    qtbot.waitExposed(window)
+    controller.open(deepsdf_atlas)
+    finish(window, controller)
+    yield window, controller
+    window.close()
+    window.deleteLater()
+    qtbot.wait(0)
+    gc.collect()
+
+
+def offered(window) -> set[str]:
+    return {action.text() for action in window.findChildren(QAction) if action.isVisible()}
+
+
+def test_what_the_model_cannot_do_is_absent(ready):
+    window, controller = ready
+    assert visible_panels(controller.state) == (FULL_SHAPE,)
+    assert {panel.kind for panel in all_panels(controller.state.atlas)}.isdisjoint({"template", "effect"})
+    assert window.covariates.rows == {} and not window.covariates.reset_all.isVisible()
+    texts = offered(window)
+    assert {"Full shape", "Fit"} <= texts
+    assert texts.isdisjoint({"Side by side", "Before and after", "Reset all covariates"})
+
+
+def test_the_average_is_shown_exactly_and_again_at_the_next_start(ready, deepsdf_atlas, tmp_path):
+    _, controller = ready
+    assert controller.shown[FULL_SHAPE].is_exact
+    again = Engine(folder=tmp_path / "cache")
+    again.prepare_previews(again.open(deepsdf_atlas).path)
+    third = Engine(folder=tmp_path / "cache")
+    third.open(deepsdf_atlas)
+    assert third.was_kept(deepsdf_atlas) and not third.has_previews(deepsdf_atlas)
+
+
+def test_a_scan_is_fitted_by_its_code_alone(ready, tmp_path):
+    window, controller = ready
+    egg(6.0, 1.0).export(tmp_path / "p01.stl")
+    window.scan_requested.emit(tmp_path / "p01.stl")
+    finish(window, controller)
+    assert window.patients.known.rows == {}
+    window.patients.known.fit.click()
+    finish(window, controller)
+    state = controller.state
+    assert state.layout is Layout.FIT and state.fit.values == () and state.fit.lasting is None
+    assert state.fit.volume_cm3 == pytest.approx(egg(6.0, 1.0).volume / 1000, rel=TOLERATED)
+    assert controller.shown[FULL_SHAPE].request.person == state.person > 0
+    assert not window.patients.compare.isVisible()
+    window.covariates.reset_all_requested.emit()
+    assert controller.state.values == ()
