@@ -12,7 +12,10 @@ from PySide6.QtCore import QObject, Qt, SignalInstance
 from PySide6.QtGui import QAction, QActionGroup, QKeySequence
 from PySide6.QtWidgets import QMenu, QToolBar, QWidget
 
-from naisr_viewer.state.explorer import OF_A_PATIENT, ExplorerState, Layout
+from naisr_viewer.panels.kinds import layouts_of
+from naisr_viewer.state.atlas_card import AtlasCard
+from naisr_viewer.state.explorer import ExplorerState
+from naisr_viewer.state.layouts import Layout
 from naisr_viewer.state.theme import ThemeChoice
 from naisr_viewer.views.covariates.panel import CovariatePanel
 from naisr_viewer.views.shapes.camera import DIRECTIONS
@@ -52,6 +55,9 @@ class Window(Protocol):
     def ask_screenshot(self) -> None:
         """Let a place be chosen for a picture."""
 
+    def show_document(self, page: str) -> None:
+        """Open one of the documents that come with the program."""
+
     def show_sides(self) -> None:
         """Show the panels beside the shapes that are switched on."""
 
@@ -70,6 +76,7 @@ class Command:
         keys: shortcuts, the one that is shown first.
         tip: more than the text, on hover.
         needs: what must be so.
+        offered: whether there is such a thing for an atlas; it is absent where not.
         group: of which one is chosen; empty for a command that stands alone.
         is_switch: whether it is on or off.
     """
@@ -80,6 +87,7 @@ class Command:
     keys: tuple[str, ...] = ()
     tip: str = ""
     needs: frozenset[Fact] = frozenset()
+    offered: Callable[[AtlasCard], bool] = lambda _: True
     group: str = ""
     is_switch: bool = False
 
@@ -99,7 +107,8 @@ def _layout(layout: Layout, number: int) -> Command:
         layout.capitalize(),
         lambda window: window.layout_requested.emit(layout),
         keys=(f"Ctrl+{number}",),
-        needs=OPEN | {Fact.FIT} if layout in OF_A_PATIENT else OPEN,
+        needs=OPEN | {Fact.FIT} if layout.needs_fit else OPEN,
+        offered=lambda atlas: layout in layouts_of(atlas),
         group="layout",
     )
 
@@ -123,8 +132,19 @@ def _theme(choice: ThemeChoice) -> Command:
     )
 
 
+def _document(title: str, page: str, *keys: str) -> Command:
+    return Command(f"document {page}", title, lambda window: window.show_document(page), keys=keys)
+
+
 LAYOUTS = tuple(_layout(layout, number) for number, layout in enumerate(Layout, start=1))
 LOOKS = tuple(_look(direction, number) for number, direction in enumerate(DIRECTIONS, start=1))
+DOCUMENTS = (
+    _document("User guide", "user-guide.md", "F1"),
+    _document("Methods", "methods.md"),
+    _document("Results", "results.md"),
+    _document("Glossary", "glossary.md"),
+    _document("Architecture", "architecture.md"),
+)
 THEMES = tuple(_theme(choice) for choice in ThemeChoice)
 
 COMMANDS = (
@@ -182,6 +202,7 @@ COMMANDS = (
         lambda window: window.covariates.reset_all_requested.emit(),
         keys=("Ctrl+R",),
         needs=AT_REST,
+        offered=lambda atlas: bool(atlas.covariates),
     ),
     *LAYOUTS,
     Command(
@@ -203,6 +224,7 @@ COMMANDS = (
     ),
     *LOOKS,
     *THEMES,
+    *DOCUMENTS,
     Command("about", "About", lambda window: window.about_requested.emit()),
 )
 """All that can be told."""
@@ -224,7 +246,7 @@ MENUS = {
     "&View": (
         *_names(LAYOUTS), "patients", SEPARATOR, "reset camera", *_names(LOOKS), SEPARATOR, *_names(THEMES),
     ),
-    "&Help": ("about",),
+    "&Help": (*_names(DOCUMENTS), SEPARATOR, "about"),
 }  # fmt: skip
 """What stands in the menu bar, by name."""
 
@@ -297,3 +319,9 @@ def enable(commands: Sequence[Command], actions: Mapping[str, QAction], so: Abst
     """Enable the commands whose needs are met by what is so."""
     for command in commands:
         actions[command.name].setEnabled(command.needs <= so)
+
+
+def offer(commands: Sequence[Command], actions: Mapping[str, QAction], atlas: AtlasCard) -> None:
+    """Show the commands that there are for an atlas, and no others."""
+    for command in commands:
+        actions[command.name].setVisible(command.offered(atlas))

@@ -9,7 +9,9 @@ from PySide6.QtCore import QSize, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QGuiApplication, QImage, QPaintEvent
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QMainWindow, QWidget
 
-from naisr_viewer.state.explorer import ExplorerState, visible_panels
+from naisr_model.shipped import shipped
+from naisr_viewer.panels.kinds import visible_panels
+from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.patients import Labels
 from naisr_viewer.state.theme import ThemeChoice
 from naisr_viewer.views.actions import (
@@ -21,10 +23,12 @@ from naisr_viewer.views.actions import (
     fill,
     make_actions,
     make_toolbar,
+    offer,
 )
 from naisr_viewer.views.centre import Centre
 from naisr_viewer.views.covariates.panel import CovariatePanel
 from naisr_viewer.views.dialogs.about import about
+from naisr_viewer.views.dialogs.documents import DocumentWindow
 from naisr_viewer.views.dialogs.export import ExportDialog
 from naisr_viewer.views.dialogs.files import ask_image_path, ask_open_path, ask_scan_path, dropped, is_atlas
 from naisr_viewer.views.dialogs.label import ask_label
@@ -40,7 +44,11 @@ FIRST_SIZE = QSize(1280, 800)
 
 
 class MainWindow(QMainWindow):
-    """Shows a state; every user act leaves as a signal."""
+    """Shows a state; every user act leaves as a signal.
+
+    It is long because it is the one door to all that is seen: a setter for each thing shown, a question for
+    each thing asked; what they do is in the widgets.
+    """
 
     open_requested = Signal(Path)  # an atlas was chosen, dropped or picked from the recent ones
     scan_requested = Signal(Path)  # a patient's file was chosen or dropped
@@ -62,6 +70,7 @@ class MainWindow(QMainWindow):
         self.setAcceptDrops(True)
         self._theme_choice = ThemeChoice.SYSTEM
         self._has_appeared = False
+        self._documents: DocumentWindow | None = None
         self._is_editable, self._can_undo, self._can_redo = True, False, False
         self.covariates = CovariatePanel(self)
         self.shapes = ShapeView(self)
@@ -87,6 +96,7 @@ class MainWindow(QMainWindow):
             self.covariates.show_atlas(state.atlas, theme)
             self.shapes.show_atlas(state.atlas, theme)
             self.setWindowTitle(f"{state.atlas.name} — {TITLE}")
+            offer(COMMANDS, self._actions, state.atlas)
         self._centre.show_shapes(state.atlas is not None)
         self.scale.setVisible(state.atlas is not None)
         self.covariates.show_values(state)
@@ -151,6 +161,11 @@ class MainWindow(QMainWindow):
     def show_about(self, version: str) -> None:
         """Say what this program is, until it is dismissed."""
         about(self, version)
+
+    def show_document(self, page: str) -> None:
+        """Open one of the documents that come with the program, in the window that shows one already."""
+        self._documents = self._documents or DocumentWindow(shipped("docs"), self)
+        self._documents.show_page(page)
 
     def set_editable(self, editable: bool) -> None:
         """Whether covariates and patients can be changed just now; what would end the work rests, too."""

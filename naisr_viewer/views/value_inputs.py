@@ -6,8 +6,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QDoubleSpinBox, QPushButton, QWidget
 
 from naisr_model.covariates import Covariate
-from naisr_viewer.state.explorer import label
 from naisr_viewer.words.numbers import decimals
+from naisr_viewer.words.titles import label
 
 
 class ValueBox(QDoubleSpinBox):

@@ -5,10 +5,12 @@ from __future__ import annotations
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtWidgets import QCheckBox, QFrame, QLabel, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
-from naisr_viewer.state.explorer import AtlasCard, ExplorerState, label
+from naisr_viewer.state.atlas_card import AtlasCard
+from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.views.colours import covariate_colour
 from naisr_viewer.views.covariates.row import CovariateRow
 from naisr_viewer.views.theme import Theme
+from naisr_viewer.words.titles import label
 
 PANEL_WIDTH = 320
 
@@ -63,7 +65,7 @@ class CovariatePanel(QFrame):
         self.title.setText(f"{label(atlas.name)} atlas")
         self.subtitle.setText(_origin(atlas))
         self.follow.setVisible(sum(covariate.kind == "continuous" for covariate in atlas.covariates) > 1)
-        self.reset_all.setVisible(True)
+        self.reset_all.setVisible(bool(atlas.covariates))
         self.set_theme(theme)
 
     def show_values(self, state: ExplorerState) -> None:
@@ -117,4 +119,5 @@ class CovariatePanel(QFrame):
 def _origin(atlas: AtlasCard) -> str:
     training = ~atlas.population.held_out
     subjects = {s for s, used in zip(atlas.population.subjects, training, strict=True) if used}
-    return f"from {int(training.sum())} shapes of {len(subjects)} subjects"
+    origin = f"from {int(training.sum())} shapes of {len(subjects)} subjects"
+    return origin if atlas.covariates else f"{origin}; its shapes depend on no covariates"

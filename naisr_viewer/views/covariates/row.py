@@ -8,12 +8,12 @@ from PySide6.QtCore import QSignalBlocker, QTimer, Signal
 from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QLabel, QToolButton, QVBoxLayout, QWidget
 
 from naisr_model.covariates import Covariate
-from naisr_viewer.state.explorer import label
 from naisr_viewer.views.covariates.histogram import Histogram
 from naisr_viewer.views.covariates.slider import JumpSlider, slider_position, slider_value
 from naisr_viewer.views.theme import Theme
 from naisr_viewer.views.value_inputs import LevelButton, ValueBox, level_buttons
 from naisr_viewer.words.numbers import mean_reading, reading
+from naisr_viewer.words.titles import label
 
 SETTLE_MS = 400
 """Keys and wheel count as one movement until they pause this long."""

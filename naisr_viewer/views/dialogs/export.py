@@ -16,7 +16,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from naisr_viewer.state.explorer import AtlasCard, Panel, all_panels, panel_title
+from naisr_viewer.panels.kinds import panels_in, title_of
+from naisr_viewer.state.atlas_card import AtlasCard
+from naisr_viewer.state.layouts import Layout, Panel
 from naisr_viewer.state.requests import EXACT_RESOLUTION, FORMATS, ExportChoice
 from naisr_viewer.views.dialogs.pieces import buttons_of, column_in
 
@@ -30,11 +32,11 @@ class ExportDialog(QDialog):
         super().__init__(parent)
         self.setWindowTitle("Export surfaces")
         self.setMinimumWidth(460)
-        panels = all_panels(atlas)
+        panels = panels_in(Layout.SIDE_BY_SIDE, atlas)
         self.what = QComboBox(self)
         self.what.addItem("All views", panels)
         for panel in reversed(panels):
-            self.what.addItem(panel_title(panel), (panel,))
+            self.what.addItem(title_of(panel), (panel,))
         self.format = QComboBox(self)
         self.format.addItems([name.upper() for name in FORMATS])
         self.detail = QComboBox(self)

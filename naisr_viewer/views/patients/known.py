@@ -8,12 +8,15 @@ from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QLabel, QWidget
 
 from naisr_model.covariates import Covariate
-from naisr_viewer.state.explorer import label
-from naisr_viewer.state.patients import Named, Patient
+from naisr_viewer.state.patients import Named, OpenScan
 from naisr_viewer.views.patients.pieces import button, exchange, grid_in, paragraph, section
 from naisr_viewer.views.value_inputs import LevelButton, ValueBox, level_buttons
+from naisr_viewer.words.titles import label
 
 FIT_TIP = "Find the shape of the atlas that comes closest to the scan"
+
+ADVICE = "Tick what is known; the rest is inferred from the shape."
+NOTHING_TO_KNOW = "The shapes of this atlas depend on no covariates; there is nothing to be known."
 
 FAR = 1e6
 """Beyond any value of a covariate."""
@@ -155,7 +158,8 @@ class KnownPart(QWidget):
         self.fit = button("Fit", FIT_TIP, "primary")
         self._table = QWidget()
         column = section(self, "Known covariates")
-        column.addWidget(paragraph("Tick what is known; the rest is inferred from the shape.", "muted"))
+        self._advice = paragraph(ADVICE, "muted")
+        column.addWidget(self._advice)
         column.addWidget(self._table)
         column.addSpacing(4)
         column.addWidget(self.fit)
@@ -168,9 +172,10 @@ class KnownPart(QWidget):
         for line, row in enumerate(self.rows.values()):
             for column, widget in enumerate((row.check, row.field, row.note)):
                 grid.addWidget(widget, line, column)
+        self._advice.setText(ADVICE if covariates else NOTHING_TO_KNOW)
         self._table = exchange(self._table, table)
 
-    def show_patient(self, patient: Patient) -> None:
+    def show_patient(self, patient: OpenScan) -> None:
         """Show whether ``patient`` can be fitted; what is typed stays."""
         self.fit.setText("Fit again" if patient.fit else "Fit")
         self.fit.setEnabled(not patient.scan.blocked)

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from naisr_viewer.state.patients import Patient
+from naisr_viewer.state.patients import OpenScan
 from naisr_viewer.words.numbers import volume
 
 ROWS_IN_SIGHT = 4
@@ -53,9 +53,9 @@ class PatientList(QListWidget):
         self.setAccessibleName("Patients")
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.currentItemChanged.connect(lambda _item: self.patient_chosen.emit(self._key()))
-        self._patients: tuple[Patient, ...] = ()
+        self._patients: tuple[OpenScan, ...] = ()
 
-    def show_patients(self, patients: tuple[Patient, ...], shown: int | None) -> None:
+    def show_patients(self, patients: tuple[OpenScan, ...], shown: int | None) -> None:
         """Bring the rows up to date and mark the one that is shown."""
         with QSignalBlocker(self):
             if patients != self._patients:
@@ -97,7 +97,7 @@ class PatientList(QListWidget):
             line.addWidget(widget)
         self.setItemWidget(item, row)
 
-    def _close_button(self, patient: Patient) -> QToolButton:
+    def _close_button(self, patient: OpenScan) -> QToolButton:
         close = QToolButton()
         close.setText("×")
         close.setAutoRaise(True)

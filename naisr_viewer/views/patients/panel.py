@@ -9,8 +9,10 @@ from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QScrollArea, QVBoxLayout, QWidget
 
 from naisr_model.covariates import Covariate
+from naisr_viewer.panels.kinds import layouts_of
 from naisr_viewer.state.explorer import ExplorerState
-from naisr_viewer.state.patients import Named, Patient
+from naisr_viewer.state.layouts import Layout
+from naisr_viewer.state.patients import Named, OpenScan
 from naisr_viewer.views.patients.known import KnownPart, NumberField
 from naisr_viewer.views.patients.list import PatientList
 from naisr_viewer.views.patients.pieces import button, exchange, paragraph
@@ -67,8 +69,9 @@ class PatientPanel(QFrame):
         self.list.show_patients(state.patients, state.patient)
         for part in (self.scan, self.alignment, self.known):
             part.setVisible(state.shown is not None)
-        for found in (self.result, self.compare):
-            found.setVisible(state.fit is not None)
+        self.result.setVisible(state.fit is not None)
+        can_compare = state.atlas is not None and Layout.CHANGE in layouts_of(state.atlas)
+        self.compare.setVisible(state.fit is not None and can_compare)
         if state.shown is not None:
             self._show_patient(state.shown, old.shown)
 
@@ -83,7 +86,7 @@ class PatientPanel(QFrame):
         event.ignore()
         return True
 
-    def _show_known(self, old: Patient | None, new: Patient | None) -> None:
+    def _show_known(self, old: OpenScan | None, new: OpenScan | None) -> None:
         """What was typed belongs to its patient and is found again when that is shown again."""
         if old is not None and (new is None or new.key != old.key):
             self._drafts[old.key] = self.known.given()
@@ -96,7 +99,7 @@ class PatientPanel(QFrame):
         elif new.known and new.known != old.known:
             self.known.give(new.known)
 
-    def _show_patient(self, new: Patient, old: Patient | None) -> None:
+    def _show_patient(self, new: OpenScan, old: OpenScan | None) -> None:
         state = self._state
         self.scan.show_patient(new, state.has_ghost)
         self.alignment.show_patient(new, state.has_ghost)

@@ -8,7 +8,7 @@ from pathlib import Path
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QCheckBox, QFormLayout, QFrame, QHBoxLayout, QVBoxLayout, QWidget
 
-from naisr_viewer.state.patients import Method, Patient, Reading
+from naisr_viewer.state.patients import Method, OpenScan, Reading
 from naisr_viewer.views.dialogs.files import ask_landmarks_path
 from naisr_viewer.views.patients.pieces import ChoiceBox, button, exchange, paragraph, section, warnings
 from naisr_viewer.words.patients import METHODS, breakable, measured, sentence, units
@@ -35,7 +35,7 @@ class ScanPart(QWidget):
         self.ghost.setToolTip("Draw what was measured, transparent, over the atlas's shape")
         self._compose()
 
-    def show_patient(self, patient: Patient, has_ghost: bool) -> None:
+    def show_patient(self, patient: OpenScan, has_ghost: bool) -> None:
         """Show ``patient``'s scan."""
         scan = patient.scan
         self.source.setText(breakable(scan.source))
@@ -92,7 +92,7 @@ class AlignmentPart(QWidget):
         self.method.activated.connect(self._method_chosen)
         self.unit.activated.connect(self._unit_chosen)
 
-    def show_patient(self, patient: Patient, has_ghost: bool) -> None:
+    def show_patient(self, patient: OpenScan, has_ghost: bool) -> None:
         """Show how ``patient``'s file was read, and that it can be seen where the scan lies."""
         self._reading = patient.reading
         self.method.show_choices(METHODS, patient.reading.align)

@@ -8,17 +8,18 @@ from dataclasses import dataclass
 from PySide6.QtCore import QRect, Qt
 from PySide6.QtWidgets import QLabel, QWidget
 
-from naisr_viewer.state.explorer import AtlasCard, Panel, panel_title
-from naisr_viewer.state.requests import HAS_TWO_SIDES, SurfaceResult
+from naisr_viewer.panels.kinds import kind_of, title_of
+from naisr_viewer.state.atlas_card import AtlasCard
+from naisr_viewer.state.layouts import Panel
+from naisr_viewer.state.requests import SurfaceResult
 from naisr_viewer.views.colours import panel_colour
 from naisr_viewer.views.shapes.arrangement import CAPTION_PX, TITLE_PX
 from naisr_viewer.views.shapes.colour_bar import HEIGHT_PX, WIDTH_PX, ColourBar
-from naisr_viewer.words.captions import PANEL_HINTS
 
 
 def strip_height(panels: Sequence[Panel]) -> int:
     """Pixels beneath every shape for colour bars; none where no panel has one."""
-    return HEIGHT_PX if any(panel.kind in HAS_TWO_SIDES for panel in panels) else 0
+    return HEIGHT_PX if any(kind_of(panel).scale for panel in panels) else 0
 
 
 @dataclass(eq=False)
@@ -62,14 +63,15 @@ class Cell:
 def make_cell(panel: Panel, atlas: AtlasCard, parent: QWidget) -> Cell:
     """The labels of a sub-plot, still without a place, and its colour bar where it has one."""
     colour = panel_colour(atlas, panel)
-    title = QLabel(f'<span style="color:{colour}">●</span>&nbsp;{panel_title(panel)}', parent)
+    title = QLabel(f'<span style="color:{colour}">●</span>&nbsp;{title_of(panel)}', parent)
     title.setObjectName("panelTitle")
-    title.setToolTip(PANEL_HINTS[panel.kind])
-    title.setWhatsThis(PANEL_HINTS[panel.kind])
+    title.setToolTip(kind_of(panel).hint)
+    title.setWhatsThis(kind_of(panel).hint)
     caption = QLabel(parent)
     caption.setObjectName("caption")
     caption.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
-    bar = ColourBar(HAS_TWO_SIDES[panel.kind], parent) if panel.kind in HAS_TWO_SIDES else None
+    scale = kind_of(panel).scale
+    bar = None if scale is None else ColourBar(scale, kind_of(panel).unit, parent)
     if bar is not None:
-        bar.setToolTip(PANEL_HINTS[panel.kind])
+        bar.setToolTip(kind_of(panel).hint)
     return Cell(title, caption, bar)

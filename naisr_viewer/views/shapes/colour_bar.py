@@ -6,43 +6,45 @@ from PySide6.QtCore import QLineF, QPointF, QRectF, QSize
 from PySide6.QtGui import QLinearGradient, QPainter, QPaintEvent, QPalette, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from naisr_viewer.views.colours import scale_colours
+from naisr_viewer.state.requests import Scale
+from naisr_viewer.views.colours import SCALE_COLOURS
 
 WIDTH_PX = 300
 HEIGHT_PX = 38
 BAND_PX = 10
 """Height of the colours."""
 
-UNIT = " mm"
 WIDEST = "+88.8"
 """The colours leave room for half of such a number beside them, and for the unit."""
 
 
-def labels(limit_mm: float, is_signed: bool) -> tuple[str, str, str]:
+def labels(limit: float, scale: Scale) -> tuple[str, str, str]:
     """What stands at the low end, the middle and the high end of a scale, without the unit."""
-    if is_signed:
-        return f"−{limit_mm:g}", "0", f"+{limit_mm:g}"
-    return "0", f"{limit_mm / 2:g}", f"{limit_mm:g}"
+    if scale == "signed":
+        return f"−{limit:g}", "0", f"+{limit:g}"
+    return "0", f"{limit / 2:g}", f"{limit:g}"
 
 
 class ColourBar(QWidget):
-    """The colours of a scale with its ends and its middle in millimetres.
+    """The colours of a scale with its ends and its middle.
 
     Args:
-        is_signed: whether the scale runs from minus to plus its limit; else it begins at 0.
+        scale: from minus to plus its limit, or from 0.
+        unit: of the numbers.
         parent: the widget around it.
     """
 
-    def __init__(self, is_signed: bool, parent: QWidget | None = None) -> None:
+    def __init__(self, scale: Scale, unit: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._is_signed = is_signed
-        self.limit_mm: float | None = None
+        self._scale: Scale = scale
+        self._unit = f" {unit}"
+        self.limit: float | None = None
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
 
-    def set_limit(self, limit_mm: float) -> None:
+    def set_limit(self, limit: float) -> None:
         """Say what the end of the scale stands for; until then there are colours without numbers."""
-        if limit_mm != self.limit_mm:
-            self.limit_mm = limit_mm
+        if limit != self.limit:
+            self.limit = limit
             self.update()
 
     def sizeHint(self) -> QSize:
@@ -53,7 +55,7 @@ class ColourBar(QWidget):
     def band(self) -> QRectF:
         """Where the colours are."""
         advance = self.fontMetrics().horizontalAdvance
-        margin = round(advance(WIDEST) / 2 + advance(UNIT)) + 2.5
+        margin = round(advance(WIDEST) / 2 + advance(self._unit)) + 2.5
         return QRectF(margin, 4.5, self.width() - 2 * margin, BAND_PX)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
@@ -62,17 +64,17 @@ class ColourBar(QWidget):
         painter.fillRect(band, self._gradient(band))
         painter.setPen(QPen(self.palette().color(QPalette.ColorRole.Mid), 1.0))
         painter.drawRect(band)
-        if self.limit_mm is not None:
+        if self.limit is not None:
             painter.setPen(self.palette().color(QPalette.ColorRole.WindowText))
-            low, middle, high = labels(self.limit_mm, self._is_signed)
+            low, middle, high = labels(self.limit, self._scale)
             _draw_label(painter, band.bottomLeft(), low)
             _draw_label(painter, QPointF(round(band.center().x()) + 0.5, band.bottom()), middle)
-            _draw_label(painter, band.bottomRight(), high, UNIT)
+            _draw_label(painter, band.bottomRight(), high, self._unit)
         painter.end()
 
     def _gradient(self, band: QRectF) -> QLinearGradient:
         gradient = QLinearGradient(band.topLeft(), band.topRight())
-        colours = scale_colours(self._is_signed)
+        colours = SCALE_COLOURS[self._scale]
         for index, colour in enumerate(colours):
             gradient.setColorAt(index / (len(colours) - 1), colour)
         return gradient

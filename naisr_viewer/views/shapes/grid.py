@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from PySide6.QtCore import QRect
 from PySide6.QtWidgets import QFrame, QWidget
 
-from naisr_viewer.state.explorer import AtlasCard, Panel
+from naisr_viewer.state.atlas_card import AtlasCard
+from naisr_viewer.state.layouts import Panel
 from naisr_viewer.views.shapes.arrangement import separators
 from naisr_viewer.views.shapes.cell import Cell, make_cell
 

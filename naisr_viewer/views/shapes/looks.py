@@ -6,8 +6,8 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 
-from naisr_viewer.state.requests import SurfaceResult
-from naisr_viewer.views.colours import scale_colours
+from naisr_viewer.state.requests import Scale, SurfaceResult
+from naisr_viewer.views.colours import SCALE_COLOURS
 
 TABLE_COLOURS = 256
 """Colours of a scale that OpenGL is told; enough to look like a gradient."""
@@ -57,14 +57,14 @@ def is_cloud(points_mm: NDArray[np.float32], faces: NDArray[np.int64]) -> bool:
     return len(points_mm) > 0 and len(faces) == 0
 
 
-def look_up_table(limit_mm: float, is_signed: bool) -> pv.LookupTable:
+def look_up_table(limit: float, scale: Scale) -> pv.LookupTable:
     """The colours of a scale for VTK; values beyond its ends have the colours of the ends."""
-    stops = np.array([pv.Color(colour).int_rgb for colour in scale_colours(is_signed)], float)
+    stops = np.array([pv.Color(colour).int_rgb for colour in SCALE_COLOURS[scale]], float)
     places = np.linspace(0, len(stops) - 1, TABLE_COLOURS)
     colours = [np.interp(places, range(len(stops)), channel) for channel in stops.T]
     table = pv.LookupTable(n_values=TABLE_COLOURS)
     table.values = np.stack([*colours, np.full(TABLE_COLOURS, 255.0)], axis=1).round().astype(np.uint8)
-    table.scalar_range = (-limit_mm if is_signed else 0.0, limit_mm)
+    table.scalar_range = (-limit if scale == "signed" else 0.0, limit)
     return table
 
 

@@ -11,7 +11,9 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
-from naisr_viewer.state.explorer import FULL_SHAPE, OF_A_PATIENT, AtlasCard, Panel, all_panels
+from naisr_viewer.panels.kinds import all_panels
+from naisr_viewer.state.atlas_card import AtlasCard
+from naisr_viewer.state.layouts import FULL_SHAPE, Panel
 from naisr_viewer.state.requests import SurfaceResult
 from naisr_viewer.views.colours import ghost_colour, panel_colour
 from naisr_viewer.views.shapes.arrangement import areas_for, drawn_height, scale_to_fit, viewport
@@ -24,16 +26,14 @@ from naisr_viewer.views.theme import LIGHT, Theme
 if TYPE_CHECKING:
     from naisr_viewer.views.shapes.canvas import Canvas
 
-OF_PATIENTS = tuple(
-    dict.fromkeys(panel for shown in OF_A_PATIENT.values() for panel in shown if panel != FULL_SHAPE)
-)
-"""Sub-plots besides those that every atlas has."""
-
 NO_FACES = np.zeros((0, 3), np.int64)
 
 
 class ShapeView(QWidget):
-    """Template, effects, full shape and the sub-plots of patients, seen through one camera."""
+    """Template, effects, full shape and the sub-plots of patients, seen through one camera.
+
+    It is long because the drawing library comes late: what is shown before is kept, and drawn when it comes.
+    """
 
     scale_changed = Signal(float)  # pixels per millimetre, after zooming or resizing
     drawn = Signal(int)  # the picture is on its way to the screen; how many sub-plots were drawn anew
@@ -83,7 +83,7 @@ class ShapeView(QWidget):
         """Make one sub-plot per panel of ``atlas`` and of its patients, still without surfaces."""
         self.prepare()
         self._atlas, self._visible = atlas, ()
-        self._grid.fill((*all_panels(atlas), *OF_PATIENTS), atlas)
+        self._grid.fill(all_panels(atlas), atlas)
         self._ghost = (None, NO_FACES)
         self._direction = OBLIQUE
         self._theme = theme
@@ -100,7 +100,7 @@ class ShapeView(QWidget):
         cell = self._grid.cells[result.request.panel]
         cell.result = result
         if cell.bar is not None and result.colouring is not None:
-            cell.bar.set_limit(result.colouring.limit_mm)
+            cell.bar.set_limit(result.colouring.limit)
         if self._canvas is not None:
             self._canvas.set_surface(self._grid.index(result.request.panel), result)
             self._frame_once(self._canvas)

@@ -9,7 +9,8 @@ import pytest
 from PySide6.QtGui import QKeySequence
 from PySide6.QtWidgets import QMenu, QWidget
 
-from naisr_viewer.state.explorer import ExplorerState, Layout, opened
+from naisr_viewer.state.explorer import ExplorerState, opened
+from naisr_viewer.state.layouts import Layout
 from naisr_viewer.state.theme import ThemeChoice
 from naisr_viewer.views import actions as va
 from naisr_viewer.views.actions import COMMANDS, MENUS, RECENT, SEPARATOR, TOOLBAR, Command, Fact

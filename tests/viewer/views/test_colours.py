@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from PySide6.QtGui import QColor
 
-from naisr_viewer.views.colours import scale_colours
+from naisr_viewer.state.requests import Scale
+from naisr_viewer.views.colours import SCALE_COLOURS
 
 
 def rgb(colour: str) -> np.ndarray:
@@ -42,24 +43,24 @@ DEUTERANOPIA = np.array(
 """How linear colours look without green cones (Machado and others, 2009, severity 1)."""
 
 
-@pytest.mark.parametrize("is_signed", [True, False])
-def test_equal_steps_look_equal(is_signed):
-    seen = oklab(linear(np.array([rgb(colour) for colour in scale_colours(is_signed)])))
+@pytest.mark.parametrize("scale", SCALE_COLOURS)
+def test_equal_steps_look_equal(scale):
+    seen = oklab(linear(np.array([rgb(colour) for colour in SCALE_COLOURS[scale]])))
     steps = np.linalg.norm(np.diff(seen, axis=0), axis=1)
     assert steps.max() / steps.min() < 1.1
 
 
 def test_an_unsigned_scale_gets_darker_and_a_signed_one_is_lightest_in_the_middle():
-    def lightness(is_signed: bool) -> np.ndarray:
-        return oklab(linear(np.array([rgb(colour) for colour in scale_colours(is_signed)])))[:, 0]
+    def lightness(scale: Scale) -> np.ndarray:
+        return oklab(linear(np.array([rgb(colour) for colour in SCALE_COLOURS[scale]])))[:, 0]
 
-    assert (np.diff(lightness(is_signed=False)) < 0).all()
-    signed = lightness(is_signed=True)
+    assert (np.diff(lightness("unsigned")) < 0).all()
+    signed = lightness("signed")
     assert (np.diff(signed[:5]) > 0).all() and (np.diff(signed[4:]) < 0).all()
 
 
 def test_colour_blind_eyes_tell_plus_from_minus():
-    colours = linear(np.array([rgb(colour) for colour in scale_colours(is_signed=True)]))
+    colours = linear(np.array([rgb(colour) for colour in SCALE_COLOURS["signed"]]))
     seen = oklab((colours @ DEUTERANOPIA.T).clip(0, 1))
     for step in range(1, 5):
         assert np.linalg.norm(seen[4 + step] - seen[4 - step]) > 0.045 * step

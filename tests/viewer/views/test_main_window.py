@@ -15,7 +15,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QMenu, QPushButton, QWidget
 from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
 
-from naisr_viewer.state.explorer import FULL_SHAPE, Layout, Panel
+from naisr_viewer.state.layouts import FULL_SHAPE, Layout, Panel
 from naisr_viewer.state.requests import EXACT_RESOLUTION, PREVIEW_RESOLUTION
 from naisr_viewer.state.theme import ThemeChoice
 from naisr_viewer.views.covariates.slider import HANDLE_PX, JumpSlider

@@ -13,8 +13,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
-from naisr_viewer.state.explorer import AtlasCard, ExplorerState, opened, with_patient, with_value
-from naisr_viewer.state.patients import Fitted, Patient, Reading, Scan
+from naisr_viewer.state.atlas_card import AtlasCard
+from naisr_viewer.state.explorer import ExplorerState, opened, with_patient, with_value
+from naisr_viewer.state.patients import Fitted, OpenScan, Reading, Scan
 from naisr_viewer.views.colours import covariate_colour
 from naisr_viewer.views.covariates import panel as cp
 from naisr_viewer.views.covariates.histogram import BAND_PX, Histogram
@@ -156,7 +157,7 @@ def with_fit(card: AtlasCard) -> ExplorerState:
     fit = Fitted(1, values, (("weight", 18.2, 34.9),), 48.0, 3.0, residual_mm=0.4, lasting=0.4, seconds=2.0)
     points_mm, faces = np.zeros((3, 3), np.float32), np.zeros((0, 3), np.int64)
     scan = Scan(points_mm, points_mm, faces, "p01.stl")
-    patient = Patient(1, "p01.stl", Reading(Path("p01.stl")), scan, (("age", 84.0), ("sex", -1.0)), fit)
+    patient = OpenScan(1, "p01.stl", Reading(Path("p01.stl")), scan, (("age", 84.0), ("sex", -1.0)), fit)
     return with_patient(opened(ExplorerState(), card), patient)
 
 

@@ -8,7 +8,8 @@ from PySide6.QtCore import Qt, QTimer
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QFileDialog, QPushButton
 
-from naisr_viewer.state.explorer import TEMPLATE, Panel, all_panels
+from naisr_viewer.panels.kinds import panels_in
+from naisr_viewer.state.layouts import TEMPLATE, Layout, Panel
 from naisr_viewer.state.requests import EXACT_RESOLUTION
 from naisr_viewer.views.dialogs.export import ExportDialog
 
@@ -17,7 +18,7 @@ def test_all_views_are_proposed_as_they_are_on_screen(qtbot, card):
     dialog = ExportDialog(card)
     qtbot.addWidget(dialog)
     choice = dialog.choice()
-    assert choice.panels == all_panels(card)
+    assert choice.panels == panels_in(Layout.SIDE_BY_SIDE, card)
     assert choice.resolution == EXACT_RESOLUTION
     assert choice.folder == Path.home()
 

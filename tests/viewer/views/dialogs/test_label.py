@@ -15,7 +15,7 @@ from naisr_viewer.views.dialogs.label import LabelDialog, ask_label
 def test_a_label_is_chosen_by_its_title(qtbot):
     parent = QWidget()
     qtbot.addWidget(parent)
-    labels = Labels(Reading(Path("/scans/p01.nii.gz")), ((1, "1: 3.2 cm3"), (4, "4 'airway': 41.9 cm3")))
+    labels = Labels(Reading(Path("/scans/p01.nii.gz")), ((1, "1: 3.2 cm³"), (4, "4 'airway': 41.9 cm³")))
 
     def answer(key: Qt.Key) -> None:
         dialog = QApplication.activeModalWidget()

@@ -18,6 +18,6 @@ def test_closed_surfaces_are_told_from_open_ones():
 
 
 def test_values_beyond_the_ends_have_the_colours_of_the_ends():
-    table = look_up_table(2.0, is_signed=True)
+    table = look_up_table(2.0, scale="signed")
     for value, end in ((-9.0, "#2957a8"), (-2.0, "#2957a8"), (2.0, "#aa3600"), (9.0, "#aa3600")):
         assert QColor.fromRgbF(*table.map_value(value, opacity=False)).name() == end

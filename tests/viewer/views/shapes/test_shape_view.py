@@ -16,23 +16,13 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel, QWidget
 from pytestqt.qtbot import QtBot
 
-from naisr_viewer.state.explorer import (
-    BEFORE,
-    CERTAINTY,
-    CHANGE,
-    FULL_SHAPE,
-    SCAN,
-    TEMPLATE,
-    AtlasCard,
-    ExplorerState,
-    Panel,
-    all_panels,
-    opened,
-    panel_values,
-    with_value,
-)
+from naisr_viewer.panels import scan, shape
+from naisr_viewer.panels.kinds import panels_in, request_for
+from naisr_viewer.state.atlas_card import AtlasCard
+from naisr_viewer.state.explorer import ExplorerState, opened, with_value
+from naisr_viewer.state.layouts import FULL_SHAPE, TEMPLATE, Layout, Panel
 from naisr_viewer.state.requests import Colouring, SurfaceRequest, SurfaceResult
-from naisr_viewer.views.colours import SCAN_COLOUR, SHAPE_COLOUR, scale_colours
+from naisr_viewer.views.colours import SCALE_COLOURS
 from naisr_viewer.views.shapes import canvas as cv
 from naisr_viewer.views.shapes import shape_view as sv
 from naisr_viewer.views.shapes.arrangement import CAPTION_PX
@@ -40,6 +30,10 @@ from naisr_viewer.views.shapes.colour_bar import ColourBar
 from naisr_viewer.views.shapes.drawing import DRAWING
 from naisr_viewer.views.theme import DARK, LIGHT
 
+BEFORE = Panel("before")
+UNCERTAINTY = Panel("uncertainty")
+CHANGE = Panel("change")
+SCAN = Panel("scan")
 W = TypeVar("W", bound=QWidget)
 
 Surfaces = dict[Panel, SurfaceResult]
@@ -50,7 +44,7 @@ def computed(engine, card: AtlasCard, **values: float) -> Surfaces:
     state = opened(ExplorerState(), card)
     for name, value in values.items():
         state = with_value(state, name, value)
-    requests = [SurfaceRequest(card.path, p, panel_values(state, p), 40) for p in all_panels(card)]
+    requests = [request_for(state, panel, 40) for panel in panels_in(Layout.SIDE_BY_SIDE, card)]
     return {request.panel: engine.surface(request) for request in requests}
 
 
@@ -64,7 +58,7 @@ def view(qtbot: QtBot, card: AtlasCard, surfaces: Surfaces) -> Iterator[sv.Shape
     view = sv.ShapeView()
     view.resize(900, 600)
     view.show_atlas(card, LIGHT)
-    view.show_panels(all_panels(card))
+    view.show_panels(panels_in(Layout.SIDE_BY_SIDE, card))
     view.show()
     qtbot.waitExposed(view)
     show(view, surfaces)
@@ -193,7 +187,7 @@ def test_sub_plots_that_are_not_drawn_again_keep_their_pixels(view, surfaces):
     ids=["direction", "framing", "size", "theme", "quality", "mouse"],
 )
 def test_what_concerns_all_draws_all(view, card, change):
-    assert drawn_by(view, lambda: change(view))[0] == len(all_panels(card))
+    assert drawn_by(view, lambda: change(view))[0] == len(panels_in(Layout.SIDE_BY_SIDE, card))
 
 
 def test_moved_vertices_leave_the_triangles_in_opengl_alone(view, surfaces):
@@ -224,22 +218,22 @@ def test_surfaces_shown_before_anything_can_draw_appear_later(qtbot, surfaces, c
     qtbot.addWidget(view)
     view.resize(600, 400)
     view.show_atlas(card, LIGHT)
-    view.show_panels(all_panels(card))
+    view.show_panels(panels_in(Layout.SIDE_BY_SIDE, card))
     assert not view.is_ready
     view.show()
     show(view, surfaces)
     qtbot.waitUntil(lambda: view.is_ready, timeout=10_000)
     QTest.qWait(50)
-    assert rows_of_colour(view, SHAPE_COLOUR) > 50
+    assert rows_of_colour(view, shape.COLOUR) > 50
     view.clear()
 
 
 def test_an_older_child_is_drawn_taller(view, engine, card):
     view.show_panels((FULL_SHAPE,))
     show(view, computed(engine, card))
-    young = rows_of_colour(view, SHAPE_COLOUR)
+    young = rows_of_colour(view, shape.COLOUR)
     show(view, computed(engine, card, age=200.0))
-    old = rows_of_colour(view, SHAPE_COLOUR)
+    old = rows_of_colour(view, shape.COLOUR)
     assert young > 100
     assert old / young == pytest.approx((45 + 15) / 45, rel=0.08)
 
@@ -268,7 +262,7 @@ def test_the_mouse_turns_all_shapes_at_once_and_draws_once_per_paint(view, card)
     QTest.mousePress(canvas, Qt.MouseButton.LeftButton, pos=QPoint(100, 150))
     QTest.mouseMove(canvas, QPoint(160, 170))
     assert canvas.ren_win.GetMultiSamples() == 0
-    assert drawn_by(view, lambda: None) == [len(all_panels(card))]
+    assert drawn_by(view, lambda: None) == [len(panels_in(Layout.SIDE_BY_SIDE, card))]
     QTest.mouseRelease(canvas, Qt.MouseButton.LeftButton, pos=QPoint(160, 170))
     assert canvas.ren_win.GetMultiSamples() == cv.REST_SAMPLES
     assert np.linalg.norm(np.subtract(canvas.camera.position, position)) > 1
@@ -279,7 +273,7 @@ def test_the_mouse_turns_all_shapes_at_once_and_draws_once_per_paint(view, card)
         canvas.refresh()
     QTest.qWait(50)
     view.drawn.disconnect(paintings.append)
-    assert paintings == [len(all_panels(card))]
+    assert paintings == [len(panels_in(Layout.SIDE_BY_SIDE, card))]
 
 
 def test_the_users_zoom_survives_a_new_layout(view):
@@ -323,14 +317,14 @@ def test_another_atlas_gets_a_canvas_of_its_own(view, surfaces, card):
     view.show_panels((TEMPLATE, FULL_SHAPE))
     show(view, surfaces)
     assert closed == [True]
-    assert rows_of_colour(view, SHAPE_COLOUR) > 50
+    assert rows_of_colour(view, shape.COLOUR) > 50
 
 
 @pytest.fixture
 def views(view, surfaces) -> sv.ShapeView:
     """The sub-plots of a fit with one surface in all of them, seen from the left."""
-    view.show_panels((FULL_SHAPE, SCAN, CERTAINTY))
-    for panel in (FULL_SHAPE, SCAN, CERTAINTY, BEFORE, CHANGE):
+    view.show_panels((FULL_SHAPE, SCAN, UNCERTAINTY))
+    for panel in (FULL_SHAPE, SCAN, UNCERTAINTY, BEFORE, CHANGE):
         view.show_surface(of(surfaces, panel))
     view.look_from("the left")
     QTest.qWait(30)
@@ -342,7 +336,7 @@ def of(surfaces: Surfaces, panel: Panel, values_mm=None, limit_mm: float = 2.0) 
     result, colouring = surfaces[TEMPLATE], None
     if values_mm is not None:
         values_mm = np.broadcast_to(np.asarray(values_mm, np.float32), len(result.points_mm)).copy()
-        colouring = Colouring(values_mm, limit_mm, is_signed=panel != CERTAINTY)
+        colouring = Colouring(values_mm, limit_mm, scale="unsigned" if panel == UNCERTAINTY else "signed")
     return replace(result, request=replace(result.request, panel=panel), colouring=colouring)
 
 
@@ -358,11 +352,11 @@ def rgb(colour: str) -> np.ndarray:
     return np.array([wanted.red(), wanted.green(), wanted.blue()], float)
 
 
-@pytest.mark.parametrize(("panel", "share"), [(SCAN, -1.0), (SCAN, 0.0), (SCAN, 1.0), (CERTAINTY, 0.5)])
+@pytest.mark.parametrize(("panel", "share"), [(SCAN, -1.0), (SCAN, 0.0), (SCAN, 1.0), (UNCERTAINTY, 0.5)])
 def test_a_surface_has_the_colours_of_its_bar(views, panel, share, surfaces):
     views.show_surface(of(surfaces, panel, 2.0 * share))
-    place = share if panel == CERTAINTY else (share + 1) / 2
-    colours = scale_colours(is_signed=panel == SCAN)
+    place = share if panel == UNCERTAINTY else (share + 1) / 2
+    colours = SCALE_COLOURS["signed" if panel == SCAN else "unsigned"]
     seen, expected = middle(views, panel), rgb(colours[round(place * (len(colours) - 1))])
     assert np.abs(seen - expected).max() < 25  # the light falls from the side
     others = [rgb(colour) for colour in colours]
@@ -411,10 +405,11 @@ def test_a_moved_coloured_surface_is_drawn_like_a_new_one(views, surfaces):
 
 def test_a_colour_bar_stands_between_shape_and_caption(views, card):
     with_bar = set()
-    for panels in (all_panels(card), (BEFORE, FULL_SHAPE, CHANGE), (FULL_SHAPE, SCAN, CERTAINTY)):
+    for panels in (panels_in(layout, card) for layout in Layout):
         views.show_panels(panels)
         with_bar |= {panel for panel in panels if beneath(views, panel, ColourBar) is not None}
-    assert with_bar == {SCAN, CERTAINTY, CHANGE}
+    assert with_bar == {SCAN, UNCERTAINTY, CHANGE}
+    views.show_panels(panels_in(Layout.FIT, card))
     bar, shape, below = beneath(views, SCAN, ColourBar), inside(views, SCAN)[0], caption(views, SCAN)
     assert bar is not None
     place = bar.geometry()
@@ -430,16 +425,16 @@ def test_the_bar_keeps_its_numbers_while_a_preview_is_plain(views, surfaces):
     views.show_panels((BEFORE, FULL_SHAPE, CHANGE))
     bar = beneath(views, CHANGE, ColourBar)
     assert bar is not None
-    assert bar.limit_mm is None
+    assert bar.limit is None
     views.show_surface(of(surfaces, CHANGE, 1.0, limit_mm=5.0))
     views.show_surface(of(surfaces, CHANGE))
-    assert bar.limit_mm == 5.0
+    assert bar.limit == 5.0
 
 
 def test_the_usual_layouts_have_no_strip_for_bars(view, card):
     usual, labels = pixels(view), caption(view, FULL_SHAPE).geometry()
-    view.show_panels((FULL_SHAPE, SCAN, CERTAINTY))
-    view.show_panels(all_panels(card))
+    view.show_panels((FULL_SHAPE, SCAN, UNCERTAINTY))
+    view.show_panels(panels_in(Layout.SIDE_BY_SIDE, card))
     np.testing.assert_array_equal(pixels(view), usual)
     assert caption(view, FULL_SHAPE).geometry() == labels
     assert not any(bar.isVisible() for bar in view.findChildren(ColourBar))
@@ -447,7 +442,7 @@ def test_the_usual_layouts_have_no_strip_for_bars(view, card):
 
 def test_hidden_sub_plots_are_not_drawn(view, surfaces):
     def all_of_a_patient() -> None:
-        for panel in (SCAN, CERTAINTY, BEFORE, CHANGE):
+        for panel in (SCAN, UNCERTAINTY, BEFORE, CHANGE):
             view.show_surface(of(surfaces, panel))
 
     assert drawn_by(view, all_of_a_patient) == []
@@ -506,7 +501,7 @@ def test_a_ghost_is_framed_with_the_shapes(views, surfaces):
     alone = views.canvas.box_mm()
     views.show_ghost(*ghost_of(surfaces, 1.5))
     np.testing.assert_allclose(views.canvas.box_mm(), 1.5 * alone, atol=0.1)
-    views.show_panels((SCAN, CERTAINTY))
+    views.show_panels((SCAN, UNCERTAINTY))
     np.testing.assert_allclose(views.canvas.box_mm(), alone, atol=0.1)
 
 
@@ -538,7 +533,7 @@ def test_a_cloud_is_drawn_as_points(views, surfaces):
     dots = pixels(views)[inside(views, SCAN)]
     is_dot = (dots != rgb(LIGHT.canvas)).any(axis=2)
     assert 300 < is_dot.sum() < whole
-    assert abs(QColor(*map(int, np.median(dots[is_dot], axis=0))).hue() - QColor(SCAN_COLOUR).hue()) < 20
+    assert abs(QColor(*map(int, np.median(dots[is_dot], axis=0))).hue() - QColor(scan.KIND.colour).hue()) < 20
     views.show_surface(cloud(surfaces, 2.0))
     coloured = pixels(views)[inside(views, SCAN)]
     reds = coloured[(coloured != rgb(LIGHT.canvas)).any(axis=2)]
