@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import torch
 import trimesh
-from eggs import egg, egg_preset
+from eggs import egg, egg_deepsdf_preset, egg_preset
 
 from naisr_model.data.prepare import PrepareOptions, prepare
 from naisr_model.data.store import SampleStore
@@ -52,4 +52,12 @@ def egg_atlas(egg_store: SampleStore, tmp_path_factory: pytest.TempPathFactory) 
     """An atlas of the eggs, trained for some seconds."""
     out = tmp_path_factory.mktemp("atlas") / "eggs.safetensors"
     train(egg_store, egg_preset(epochs=300), out)
+    return out
+
+
+@pytest.fixture(scope="session")
+def egg_deepsdf(egg_store: SampleStore, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same of a model that depends on no covariates."""
+    out = tmp_path_factory.mktemp("deepsdf") / "eggs.safetensors"
+    train(egg_store, egg_deepsdf_preset(epochs=60), out)
     return out

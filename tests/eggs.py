@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
+import numpy as np
+import SimpleITK
 import trimesh
+from numpy.typing import ArrayLike, NDArray
 
 from naisr_model.config import Preset, SirenConfig
 from naisr_model.models.deepsdf import DeepSdfConfig
@@ -48,3 +52,32 @@ def egg_deepsdf_preset(epochs: int) -> Preset:
         latent_rate=1e-2,
     )
     return Preset("deepsdf", network, training)
+
+
+def saved(mesh: trimesh.Trimesh, path: Path, matrix: ArrayLike | None = None) -> Path:
+    """A mesh as a file, moved by a 4x4 matrix."""
+    mesh = mesh.copy() if matrix is None else mesh.copy().apply_transform(matrix)
+    mesh.export(path)
+    return path
+
+
+def turned(degrees: float, shift_mm: ArrayLike) -> NDArray[np.float64]:
+    """The 4x4 matrix of a turn about x and a shift."""
+    matrix = np.asarray(trimesh.transformations.rotation_matrix(np.radians(degrees), [1.0, 0.0, 0.0]))
+    matrix[:3, 3] = shift_mm
+    return matrix
+
+
+def label_volume(path: Path) -> Path:
+    """Label 1 a small block, label 2 the egg, in voxels of 1 mm; NRRD can name it."""
+    z, y, x = np.mgrid[-45:46, -30:31, -30:31]
+    half_mm = np.abs(egg(6.0, 1.0).bounds[0])
+    inside = (x / half_mm[0]) ** 2 + (y / half_mm[1]) ** 2 + (z / half_mm[2]) ** 2 < 1
+    labels = 2 * inside.astype(np.uint8)
+    labels[:4, :4, :4] = 1
+    image = SimpleITK.GetImageFromArray(labels)
+    image.SetOrigin((-30.0, -30.0, -45.0))
+    for key, value in {"LabelValue": "2", "Name": "egg"}.items():
+        image.SetMetaData(f"Segment0_{key}", value)
+    SimpleITK.WriteImage(image, str(path))
+    return path

@@ -13,8 +13,8 @@ from naisr_model.benchmark.plain import PlainNaisr, plain_loss
 from naisr_model.benchmark.subject import Scope, Subject
 from naisr_model.benchmark.timing import timed
 from naisr_model.config import Preset
-from naisr_model.learning.training.loop import accumulate_reconstruction
 from naisr_model.learning.training.objective import Batch, latent_term
+from naisr_model.learning.training.step import accumulate_reconstruction
 from naisr_model.models.factory import build, preset
 from naisr_model.models.naisr.network import Naisr
 

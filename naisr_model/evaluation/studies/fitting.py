@@ -20,7 +20,7 @@ from naisr_model.errors import InputError
 from naisr_model.evaluation.held_out import HeldOut, held_out, held_out_rows, opened, require_shapes
 from naisr_model.evaluation.journal import Record
 from naisr_model.evaluation.reports import markdown_table
-from naisr_model.learning.fitting.search import fit_latents
+from naisr_model.learning.fitting.paper import fit_latents
 from naisr_model.learning.training.objective import Batch
 from naisr_model.progress import SILENT, Progress
 

@@ -5,7 +5,6 @@ import math
 
 import pytest
 import torch
-from eggs import egg_deepsdf_preset
 
 from naisr_model import cli
 from naisr_model.benchmark import window
@@ -13,7 +12,6 @@ from naisr_model.benchmark.bench import bench, figures
 from naisr_model.benchmark.subject import QUICK, Scope
 from naisr_model.benchmark.timing import Impossible
 from naisr_model.errors import Cancelled, InputError
-from naisr_model.learning.training.loop import train
 from naisr_model.progress import Progress
 
 
@@ -50,8 +48,6 @@ def test_it_stops_when_asked(egg_atlas):
         bench(egg_atlas, QUICK, progress=Progress(is_unwanted=lambda: True))
 
 
-def test_another_model_is_not_measured(egg_store, tmp_path):
-    out = tmp_path / "deepsdf.safetensors"
-    train(egg_store, egg_deepsdf_preset(epochs=1), out)
+def test_another_model_is_not_measured(egg_deepsdf):
     with pytest.raises(InputError, match="DeepSDF is not measured; give an atlas of NAISR"):
-        bench(out, QUICK)
+        bench(egg_deepsdf, QUICK)

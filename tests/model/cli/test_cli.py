@@ -1,6 +1,5 @@
 """The command line as a user types it: a CSV and a folder of STL files become an atlas and a mesh."""
 
-import json
 import subprocess
 import sys
 
@@ -9,6 +8,7 @@ import trimesh
 from eggs import egg
 
 from naisr_model import cli
+from naisr_model.models.factory import presets
 
 SETTINGS = """
 [network]
@@ -47,6 +47,7 @@ def test_from_a_table_of_stl_files_to_a_mesh(naisr, egg_table, tmp_path):
     assert code == 0 and "after 4 iterations" in out and "folded points" in out
     code, out, _ = naisr("info", atlas)
     assert code == 0 and "age: 1 years to" in out and "24 shapes of 24 subjects" in out
+    assert "model: NAISR: implicit, deformable, disentangleable, evolvable, transferable" in out
 
 
 def test_a_mesh_of_the_atlas_is_written_in_millimetres(naisr, egg_atlas, tmp_path):
@@ -58,21 +59,6 @@ def test_a_mesh_of_the_atlas_is_written_in_millimetres(naisr, egg_atlas, tmp_pat
     assert naisr("mesh", egg_atlas, tmp_path / "t.ply", "--template", "--resolution", 32)[0] == 0
     code, _, _ = naisr("mesh", egg_atlas, tmp_path / "a.obj", "--effect", "age", "--set", "age=2")
     assert code == 0 and len(trimesh.load_mesh(tmp_path / "a.obj").faces) > 1000
-
-
-def test_evaluating_shapes_of_one_s_own(naisr, egg_atlas, egg_store, tmp_path):
-    target = tmp_path / "figures.json"
-    code, out, _ = naisr(
-        "evaluate", "reconstruction", egg_atlas, "--store", egg_store.path,
-        "--json", target, "--limit", 2,
-    )  # fmt: skip
-    figures = json.loads(target.read_text())
-    assert code == 0 and "cm³" in out and figures["n"] == 2
-    assert 0 < figures["cd_x100"]["mean"] < 5 and 0 < figures["hd_x100"]["median"] < 30
-    assert figures["components"] == [1, 1] and figures["folded_share"] < 0.05
-    assert figures["truth_volume_error"] == {}
-    code, _, error = naisr("evaluate", "reconstruction", egg_atlas)
-    assert code == 2 and "--store" in error
 
 
 @pytest.mark.parametrize(
@@ -89,14 +75,17 @@ def test_evaluating_shapes_of_one_s_own(naisr, egg_atlas, egg_store, tmp_path):
         (["train", "STORE", "--out", "x.safetensors", "--time-budget", "soon"], "write it as 90s"),
         (["prepare", "nowhere.csv", "--out", "x"], "nowhere.csv"),
         (["populate", "moon", "x"], "unknown population 'moon'"),
+        (["mesh", "DEEPSDF", "x.stl", "--template"], "DeepSDF has no template; leave out --template"),
+        (["mesh", "DEEPSDF", "x.stl", "--set", "age=3"], "depend on no covariates; leave out --set"),
+        (["mesh", "DEEPSDF", "x.stl", "--effect", "age"], "does not tell covariates apart; leave out"),
         (["fly"], "fly"),
     ],
 )
 def test_bad_input_gets_one_sentence_and_exit_code_2(
-    naisr, egg_atlas, egg_store, tmp_path, monkeypatch, words, message
+    naisr, egg_atlas, egg_deepsdf, egg_store, tmp_path, monkeypatch, words, message
 ):
     monkeypatch.chdir(tmp_path)
-    there = {"ATLAS": egg_atlas, "STORE": egg_store.path}
+    there = {"ATLAS": egg_atlas, "DEEPSDF": egg_deepsdf, "STORE": egg_store.path}
     code, _, error = naisr(*(there.get(word, word) for word in words))
     assert code == 2 and message in error and "Traceback" not in error
     assert not list(tmp_path.iterdir())
@@ -119,15 +108,16 @@ def test_the_package_runs_as_a_module():
     assert subprocess.run([*command, "fly"], capture_output=True, check=False).returncode == 2
 
 
-@pytest.mark.parametrize("name", ["reconstruction", "transfer", "completion", "fitting"])
-def test_every_evaluation_says_what_its_options_mean(naisr, name):
-    code, out, _ = naisr("evaluate", name, "--help")
+def test_a_model_without_covariates_makes_its_average(naisr, egg_deepsdf, tmp_path):
+    assert naisr("mesh", egg_deepsdf, tmp_path / "mean.stl", "--resolution", 32)[0] == 0
+    assert trimesh.load_mesh(tmp_path / "mean.stl").is_watertight
+    _, out, _ = naisr("info", egg_deepsdf)
+    assert "model: DeepSDF: implicit\n" in out
+
+
+def test_the_help_of_train_names_the_presets_of_every_model(naisr):
+    code, out, _ = naisr("train", "--help")
     told = " ".join(out.replace("\u2502", " ").split())
-    assert code == 0
-    for words in (
-        "the .safetensors file",
-        "--store PATH where its held-out shapes are",
-        "--limit INT at most",
-    ):
-        assert words in told
-    assert "--json PATH also write the figures to this file" in told
+    assert code == 0 and "OUT can be opened from the first minute on" in told
+    assert all(f"{name}" in told for name in presets())
+    assert "NAISR: " in told and "DeepSDF: " in told

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import pytest
 
@@ -82,7 +83,7 @@ def test_no_other_file_is_taken_for_a_journal(tmp_path, content):
 
 
 def test_a_record_is_plain_whether_it_was_kept_or_not(path):
-    record = {"pair": (1.0, 2), 3: "three"}
+    record: dict[Any, Any] = {"pair": (1.0, 2), 3: "three"}
     with keeping(path, WHAT) as keep:
         keep("row 9", record)
     assert read(path, WHAT)["row 9"] == plain(record) == {"pair": [1.0, 2], "3": "three"}

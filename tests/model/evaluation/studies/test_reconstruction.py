@@ -7,7 +7,6 @@ import json
 from functools import partial
 
 import pytest
-from eggs import egg_deepsdf_preset
 from rich.console import Console
 from rich.markdown import Markdown
 
@@ -18,7 +17,6 @@ from naisr_model.evaluation.studies import reconstruction
 from naisr_model.evaluation.studies.reconstruction import Reconstruction
 from naisr_model.evaluation.study import run
 from naisr_model.evaluation.truth import TruthPoint
-from naisr_model.learning.training.loop import train
 from naisr_model.shipped import shipped_atlas
 
 FIRST = Distances(0.01, 2.0, 1.0, 3.0, 0.5, 0.1, samples=30_000, emd_samples=2048)
@@ -155,10 +153,8 @@ def test_a_known_truth_is_held_against_the_atlas(egg_people):
 
 
 @pytest.mark.usefixtures("coarse")
-def test_a_model_without_covariates_is_asked_for_what_it_can_do(egg_store, tmp_path):
-    out = tmp_path / "deepsdf.safetensors"
-    train(egg_store, egg_deepsdf_preset(epochs=60), out)
-    study = Reconstruction(out, store=egg_store.path, limit=1)
+def test_a_model_without_covariates_is_asked_for_what_it_can_do(egg_deepsdf, egg_store):
+    study = Reconstruction(egg_deepsdf, store=egg_store.path, limit=1)
     found = run(study)
     assert found["n"] == 1 and found["inferred"] is None and found["folded_share"] is None
     assert found["mean_displacement_mm"] == {} and found["corner_components"] == []

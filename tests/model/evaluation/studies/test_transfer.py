@@ -61,3 +61,9 @@ def test_people_seen_once_are_refused_where_no_truth_is_known(egg_atlas, egg_sto
     words = ["evaluate", "transfer", str(egg_atlas), "--store", str(egg_store.path)]
     assert cli.main(words) == 2
     assert "nobody held out was seen twice" in capsys.readouterr().err
+
+
+def test_a_model_that_carries_no_shapes_to_other_covariates_is_refused(egg_deepsdf, egg_store, capsys):
+    words = ["evaluate", "transfer", str(egg_deepsdf), "--store", str(egg_store.path)]
+    assert cli.main(words) == 2
+    assert "DeepSDF does not carry shapes to other covariates" in capsys.readouterr().err

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
-import SimpleITK
 import trimesh
-from eggs import egg
+from eggs import egg, label_volume, saved, turned
 
 from naisr_model import cli
 from naisr_model.atlas import Atlas
-from naisr_model.checkpoint import load
-from naisr_model.data.align import Alignment
-from naisr_model.errors import InputError
-from naisr_model.patients.intake import aligned, labels, read, take_in
 
 KNOWN = ["--known", "age=6,sex=M"]
 TRUE_CM3 = egg(6.0, 1.0).volume / 1000
@@ -40,33 +34,6 @@ def told(egg_atlas, tmp_path_factory):
 def plain(told, tmp_path_factory) -> dict:
     """The fit of the egg as it lies."""
     return told(saved(egg(6.0, 1.0), tmp_path_factory.mktemp("plain") / "egg.stl"))
-
-
-def saved(mesh: trimesh.Trimesh, path: Path, matrix=None) -> Path:
-    mesh = mesh.copy() if matrix is None else mesh.copy().apply_transform(matrix)
-    mesh.export(path)
-    return path
-
-
-def turned(degrees: float, shift_mm) -> np.ndarray:
-    matrix = trimesh.transformations.rotation_matrix(np.radians(degrees), [1.0, 0.0, 0.0])
-    matrix[:3, 3] = shift_mm
-    return matrix
-
-
-def label_volume(path: Path) -> Path:
-    """Label 1 a small block, label 2 the egg, in voxels of 1 mm; NRRD can name it."""
-    z, y, x = np.mgrid[-45:46, -30:31, -30:31]
-    half_mm = np.abs(egg(6.0, 1.0).bounds[0])
-    inside = (x / half_mm[0]) ** 2 + (y / half_mm[1]) ** 2 + (z / half_mm[2]) ** 2 < 1
-    labels = 2 * inside.astype(np.uint8)
-    labels[:4, :4, :4] = 1
-    image = SimpleITK.GetImageFromArray(labels)
-    image.SetOrigin((-30.0, -30.0, -45.0))
-    for key, value in {"LabelValue": "2", "Name": "egg"}.items():
-        image.SetMetaData(f"Segment0_{key}", value)
-    SimpleITK.WriteImage(image, str(path))
-    return path
 
 
 def test_a_sound_file_is_fitted_as_it_lies(plain):
@@ -128,45 +95,6 @@ def test_one_of_several_labels_must_be_chosen(egg_atlas, tmp_path, capsys):
         assert message in capsys.readouterr().err
 
 
-def test_labels_can_be_listed_before_one_is_read(egg_atlas, tmp_path):
-    path = label_volume(tmp_path / "scan.nrrd")
-    titles = labels(path)
-    assert titles is not None and titles[1] == "1: 0.064 cm³" and titles[2].startswith("2 'egg': 58.")
-    assert labels(saved(egg(6.0, 1.0), tmp_path / "egg.stl")) is None
-    intake = read(path, Atlas.load(egg_atlas), label=2)
-    assert intake.is_ready and intake.proposal is None
-    assert intake.patient.volume_cm3 == pytest.approx(TRUE_CM3, rel=0.01)
-    assert intake.to_json()["volume_cm3"] == intake.patient.volume_cm3
-    (tmp_path / "bad.nrrd").write_bytes(b"NRRD0004\n")
-    with pytest.raises(InputError, match=r"bad\.nrrd"):
-        labels(tmp_path / "bad.nrrd")
-
-
-def test_a_person_may_look_before_aligning(egg_atlas, tmp_path):
-    atlas, path = Atlas.load(egg_atlas), saved(egg(6.0, 1.0), tmp_path / "far.stl", turned(0, [0, 0, 400]))
-    far = read(path, atlas)
-    assert not far.is_ready and [finding.topic for finding in far.findings] == ["far"]
-    assert "align it to the atlas" in far.remarks[0]
-    assert aligned(far, atlas, {"age": 6.0}, "none") is far
-    home = aligned(far, atlas, {"age": 6.0}, "icp")
-    assert home.is_ready and home.findings == () and home.method == "icp"
-    assert home.proposal is not None and home.proposal.turned_deg < 20
-    assert any("fits nearly as well" in remark for remark in home.remarks), "an egg turned over is an egg"
-    assert home.proposal is not None and home.proposal.after_mm < 1.5 < 300 < home.proposal.before_mm
-    assert np.array_equal(far.patient.from_file, np.eye(4)), "the proposal can still be declined"
-    whole = take_in(path, atlas, {"age": 6.0}, align="icp")
-    assert np.array_equal(whole.patient.from_file, home.patient.from_file)
-    assert whole.sentences == home.sentences
-
-
-def test_an_open_surface_has_no_volume_of_its_own(egg_atlas, tmp_path):
-    part = egg(6.0, 1.0)
-    part.update_faces(part.triangles_center[:, 2] < 15)
-    intake = read(saved(part, tmp_path / "part.ply"), Atlas.load(egg_atlas))
-    assert intake.is_ready and not intake.patient.is_closed and intake.patient.volume_cm3 is None
-    assert "volume" not in intake.sentences[-1].split(";")[0]
-
-
 def test_points_and_a_part_will_do(told, plain, tmp_path):
     points = tmp_path / "points.csv"
     np.savetxt(points, egg(6.0, 1.0).sample(400, seed=0), delimiter=",", header="x,y,z", comments="")
@@ -189,20 +117,6 @@ def test_transfer_and_evolve_take_the_same_way_in(egg_atlas, tmp_path, capsys):
         assert record["patient"]["alignment"]["before_mm"] > 200
         assert [shape["age"] for shape in record["shapes"]] == pytest.approx([6, 8])
         assert "aligned by icp" in capsys.readouterr().err
-
-
-def test_landmarks_follow_the_repairs(egg_atlas, tmp_path):
-    ends = {"top": (0.0, 0.0, 32.0), "side": (22.0, 0.0, 0.0), "front": (0.0, 20.0, 0.0)}
-    checkpoint = dataclasses.replace(load(egg_atlas), alignment=Alignment("landmarks", "", ends))
-    in_metres = turned(70, [5, 20, 300])
-    in_metres[:3] /= 1000
-    path, landmarks = saved(egg(6.0, 1.0), tmp_path / "egg.stl", in_metres), tmp_path / "landmarks.csv"
-    rows = [(name, *(in_metres @ [*point, 1])[:3]) for name, point in ends.items()]
-    landmarks.write_text("name,x,y,z\n" + "".join(f"{n},{x},{y},{z}\n" for n, x, y, z in rows))
-    intake = take_in(path, Atlas(checkpoint), {"age": 6.0}, align="landmarks", landmarks=landmarks)
-    assert np.allclose(intake.patient.from_file @ in_metres, np.eye(4), atol=1e-6)
-    assert intake.proposal is not None and intake.proposal.landmarks_mm == pytest.approx(0, abs=1e-6)
-    assert len(intake.repairs) == 1 and "landmarks 0.00 mm apart" in intake.sentences[2]
 
 
 @pytest.mark.parametrize(
@@ -231,3 +145,67 @@ def test_landmarks_need_an_atlas_that_knows_them(egg_atlas, tmp_path, capsys):
     words = ["--align", "landmarks", "--landmarks", str(landmarks)]
     assert cli.main(["fit", str(path), "--atlas", str(egg_atlas), *words]) == 2
     assert "not aligned by landmarks; choose icp or none" in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def patient(egg_atlas, tmp_path_factory) -> Path:
+    """A shape that the atlas makes itself, at known covariates and a known code."""
+    atlas, path = Atlas.load(egg_atlas), tmp_path_factory.mktemp("patient") / "scan.stl"
+    atlas.shape({"age": 6.5, "sex": 1.0}, atlas.checkpoint.latents[3], 64).export(path)
+    return path
+
+
+def test_the_command_tells_what_python_tells(egg_atlas, patient, tmp_path, capsys):
+    target = tmp_path / "fit.json"
+    assert cli.main(["fit", str(patient), "--atlas", str(egg_atlas), "--json", str(target)]) == 0
+    said, record = capsys.readouterr().out, json.loads(target.read_text())
+    fit = Atlas.load(egg_atlas).fit(trimesh.load_mesh(patient))
+    assert record["covariates"]["age"] == pytest.approx(fit.covariates["age"], abs=0.1)
+    assert record["intervals"].keys() == {"age", "sex"} and record["inferred"] == ["age", "sex"]
+    assert record["volume_interval_cm3"][0] < record["volume_cm3"] < record["volume_interval_cm3"][1]
+    assert f"volume: {record['volume_cm3']:.1f} cm³" in said and "residual:" in said
+
+
+def test_transfer_and_evolve_write_shapes_and_tables(egg_atlas, patient, tmp_path, capsys):
+    given = [str(patient), "--atlas", str(egg_atlas), "--known", "age=6.5,sex=M", "--out", str(tmp_path)]
+    assert cli.main(["transfer", *given, "--to", "age=8"]) == 0
+    said = capsys.readouterr().out
+    assert "8 years, M:" in said
+    assert "at other covariates 90% of what sets" in said  # nobody was seen twice
+    assert len((tmp_path / "volumes.csv").read_text().splitlines()) == 3
+    ways = ["--from", "3", "--to", "4", "--steps", "3", "--path", "only"]
+    assert cli.main(["evolve", *given, *ways]) == 0
+    assert len(list(tmp_path.glob("shape*.stl"))) == 3
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["fit", "PATIENT", "--known", "age"], "'age' after --known is not understood"),
+        (["fit", "PATIENT", "--known", "height=3"], "unknown covariate 'height'"),
+        (["fit", "nowhere.stl"], "nowhere.stl"),
+        (["transfer", "PATIENT", "--to", "age=99"], "the atlas was trained on 1 to"),
+        (["evolve", "PATIENT", "--along", "height"], "unknown covariate 'height'"),
+        (["evolve", "PATIENT", "--path", "nowhere.csv"], "the path nowhere.csv cannot be read"),
+    ],
+)
+def test_what_a_command_cannot_use_gets_a_sentence(egg_atlas, patient, words, message, capsys):
+    given = [str(patient) if word == "PATIENT" else word for word in words]
+    assert cli.main([*given, "--atlas", str(egg_atlas)]) == 2
+    assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "words", [["transfer", "--to", "age=8"], ["evolve", "--along", "age"], ["fit", "--known", "age=3"]]
+)
+def test_a_model_without_covariates_is_only_fitted(egg_deepsdf, patient, words, tmp_path, capsys):
+    command, *rest = words
+    assert cli.main([command, str(patient), "--atlas", str(egg_deepsdf), *rest]) == 2
+    said = capsys.readouterr().err
+    if command == "fit":
+        assert "unknown covariate 'age'; this atlas has none" in said
+    else:
+        assert "DeepSDF does not carry shapes to other covariates" in said and "naisr fit" in said
+    given = [str(patient), "--atlas", str(egg_deepsdf), "--out", str(tmp_path / "out")]
+    assert cli.main(["fit", *given]) == 0
+    assert "volume: " in capsys.readouterr().out and (tmp_path / "out" / "shapes.png").exists()

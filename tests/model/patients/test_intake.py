@@ -1,0 +1,80 @@
+"""A patient's file on its way into the frame of an atlas, step by step."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from eggs import egg, label_volume, saved, turned
+
+from naisr_model.atlas import Atlas
+from naisr_model.checkpoint import load
+from naisr_model.data.align import Alignment
+from naisr_model.errors import Cancelled, InputError
+from naisr_model.patients.intake import aligned, labels, read, take_in
+from naisr_model.progress import Progress
+
+TRUE_CM3 = egg(6.0, 1.0).volume / 1000
+
+
+def test_labels_can_be_listed_before_one_is_read(egg_atlas, tmp_path):
+    path = label_volume(tmp_path / "scan.nrrd")
+    titles = labels(path)
+    assert titles is not None and titles[1] == "1: 0.064 cm³" and titles[2].startswith("2 'egg': 58.")
+    assert labels(saved(egg(6.0, 1.0), tmp_path / "egg.stl")) is None
+    intake = read(path, Atlas.load(egg_atlas), label=2)
+    assert intake.is_ready and intake.proposal is None
+    assert intake.patient.volume_cm3 == pytest.approx(TRUE_CM3, rel=0.01)
+    assert intake.to_json()["volume_cm3"] == intake.patient.volume_cm3
+    (tmp_path / "bad.nrrd").write_bytes(b"NRRD0004\n")
+    with pytest.raises(InputError, match=r"bad\.nrrd"):
+        labels(tmp_path / "bad.nrrd")
+
+
+def test_a_person_may_look_before_aligning(egg_atlas, tmp_path):
+    atlas, path = Atlas.load(egg_atlas), saved(egg(6.0, 1.0), tmp_path / "far.stl", turned(0, [0, 0, 400]))
+    far = read(path, atlas)
+    assert not far.is_ready and [finding.topic for finding in far.findings] == ["far"]
+    assert "align it to the atlas" in far.remarks[0]
+    assert aligned(far, atlas, {"age": 6.0}, "none") is far
+    home = aligned(far, atlas, {"age": 6.0}, "icp")
+    assert home.is_ready and home.findings == () and home.method == "icp"
+    assert home.proposal is not None and home.proposal.turned_deg < 20
+    assert any("fits nearly as well" in remark for remark in home.remarks), "an egg turned over is an egg"
+    assert home.proposal is not None and home.proposal.after_mm < 1.5 < 300 < home.proposal.before_mm
+    assert np.array_equal(far.patient.from_file, np.eye(4)), "the proposal can still be declined"
+    whole = take_in(path, atlas, {"age": 6.0}, align="icp")
+    assert np.array_equal(whole.patient.from_file, home.patient.from_file)
+    assert whole.sentences == home.sentences
+
+
+def test_an_open_surface_has_no_volume_of_its_own(egg_atlas, tmp_path):
+    part = egg(6.0, 1.0)
+    part.update_faces(part.triangles_center[:, 2] < 15)
+    intake = read(saved(part, tmp_path / "part.ply"), Atlas.load(egg_atlas))
+    assert intake.is_ready and not intake.patient.is_closed and intake.patient.volume_cm3 is None
+    assert "volume" not in intake.sentences[-1].split(";")[0]
+
+
+def test_landmarks_follow_the_repairs(egg_atlas, tmp_path):
+    ends = {"top": (0.0, 0.0, 32.0), "side": (22.0, 0.0, 0.0), "front": (0.0, 20.0, 0.0)}
+    checkpoint = dataclasses.replace(load(egg_atlas), alignment=Alignment("landmarks", "", ends))
+    in_metres = turned(70, [5, 20, 300])
+    in_metres[:3] /= 1000
+    path, landmarks = saved(egg(6.0, 1.0), tmp_path / "egg.stl", in_metres), tmp_path / "landmarks.csv"
+    rows = [(name, *(in_metres @ [*point, 1])[:3]) for name, point in ends.items()]
+    landmarks.write_text("name,x,y,z\n" + "".join(f"{n},{x},{y},{z}\n" for n, x, y, z in rows))
+    intake = take_in(path, Atlas(checkpoint), {"age": 6.0}, align="landmarks", landmarks=landmarks)
+    assert np.allclose(intake.patient.from_file @ in_metres, np.eye(4), atol=1e-6)
+    assert intake.proposal is not None and intake.proposal.landmarks_mm == pytest.approx(0, abs=1e-6)
+    assert len(intake.repairs) == 1 and "landmarks 0.00 mm apart" in intake.sentences[2]
+
+
+def test_an_alignment_tells_how_far_it_is_and_can_be_stopped(egg_atlas, tmp_path):
+    atlas, path = Atlas.load(egg_atlas), saved(egg(6.0, 1.0), tmp_path / "far.stl", turned(0, [0, 0, 400]))
+    told: list[float] = []
+    take_in(path, atlas, {"age": 6.0}, align="icp", progress=Progress(told.append))
+    assert told == sorted(told) and told[-1] == 1.0
+    with pytest.raises(Cancelled):
+        take_in(path, atlas, {}, align="icp", progress=Progress(is_unwanted=lambda: True))
