@@ -10,6 +10,9 @@ TITLE_PX = 36
 CAPTION_PX = 52
 """Strips above and beneath each shape, kept free for words."""
 
+LEAST_WIDTH_PX = 150
+"""Of a panel; captions are hardly wider."""
+
 ROOM = 1.25
 """A shape is framed with this much room, so that it can grow while a slider moves."""
 
@@ -17,20 +20,22 @@ Viewport = tuple[float, float, float, float]
 """Left, bottom, right and top as shares of the canvas, counted from its lower left corner."""
 
 
-def columns_for(count: int, canvas_aspect: float, shape_aspect: float) -> int:
-    """Columns of a grid of ``count`` panels in which a shape is drawn largest.
+def columns_for(count: int, canvas: QSize, strip: int, shape_aspect: float) -> int:
+    """Columns of a grid of ``count`` panels in which a shape is drawn largest and captions have their room.
 
     Args:
         count: how many panels.
-        canvas_aspect: width over height of the whole canvas.
+        canvas: its size (px).
+        strip: pixels beneath every shape for colour bars.
         shape_aspect: width over height of a shape as seen.
     """
 
-    def drawn_height(columns: int) -> float:
+    def shape_px(columns: int) -> float:
         rows = -(-count // columns)
-        return min(1 / rows, canvas_aspect / columns / shape_aspect)
+        return min(height_left(canvas.height() / rows, strip), canvas.width() / columns / shape_aspect)
 
-    return max(range(1, count + 1), key=lambda columns: (round(drawn_height(columns), 6), -columns))
+    wide_enough = [columns for columns in range(1, count + 1) if canvas.width() >= columns * LEAST_WIDTH_PX]
+    return max(wide_enough or [1], key=lambda columns: (round(shape_px(columns), 6), -columns))
 
 
 def cells(count: int, columns: int) -> list[tuple[float, float, float, float]]:
@@ -42,15 +47,16 @@ def cells(count: int, columns: int) -> list[tuple[float, float, float, float]]:
     return [*places[:-1], (left, top, 1 - left, height)]
 
 
-def areas_for(count: int, canvas: QSize, shape_aspect: float) -> list[QRect]:
+def areas_for(count: int, canvas: QSize, strip: int, shape_aspect: float) -> list[QRect]:
     """Where each of ``count`` panels is on a canvas (px), words included.
 
     Args:
         count: how many panels.
         canvas: its size (px).
+        strip: pixels beneath every shape for colour bars.
         shape_aspect: width over height of a shape as seen.
     """
-    columns = columns_for(count, canvas.width() / canvas.height(), shape_aspect)
+    columns = columns_for(count, canvas, strip, shape_aspect)
     return [_pixels(place, canvas) for place in cells(count, columns)]
 
 
@@ -67,7 +73,12 @@ def drawn_height(area: QRect, strip: int) -> int:
         area: where the panel is (px).
         strip: pixels beneath every shape for colour bars.
     """
-    return max(area.height() - TITLE_PX - CAPTION_PX - strip, 1)
+    return round(height_left(area.height(), strip))
+
+
+def height_left(height: float, strip: int) -> float:
+    """What title, caption and colour bars leave of a panel's height (px)."""
+    return max(height - TITLE_PX - CAPTION_PX - strip, 1)
 
 
 def viewport(area: QRect, canvas: QSize, strip: int) -> Viewport:

@@ -220,8 +220,9 @@ class ShapeView(QWidget):
         if not self._visible or not self.width() or not self.height():
             return
         wide_mm, high_mm = self._seen_mm
-        places = areas_for(len(self._visible), self.size(), wide_mm / high_mm)
-        strip, areas = strip_height(self._visible), dict(zip(self._visible, places, strict=True))
+        strip = strip_height(self._visible)
+        places = areas_for(len(self._visible), self.size(), strip, wide_mm / high_mm)
+        areas = dict(zip(self._visible, places, strict=True))
         self._drawn_height = drawn_height(places[0], strip)
         old_fit, self._fit_scale = self._fit_scale, scale_to_fit(places[0], strip, wide_mm, high_mm)
         if self._canvas is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from PySide6.QtCore import QSize
 
 from naisr_viewer.views.shapes.arrangement import cells, columns_for
 
@@ -16,7 +17,18 @@ def test_cells_cover_the_canvas_without_overlap():
 
 
 def test_tall_shapes_stand_in_a_row_and_flat_ones_are_stacked():
-    assert columns_for(5, canvas_aspect=2.0, shape_aspect=0.3) == 5
-    assert columns_for(5, canvas_aspect=0.5, shape_aspect=4.0) == 1
-    assert columns_for(5, canvas_aspect=1.4, shape_aspect=0.9) == 3
-    assert columns_for(1, canvas_aspect=1.4, shape_aspect=0.9) == 1
+    assert columns_for(5, QSize(1600, 800), strip=0, shape_aspect=0.3) == 5
+    assert columns_for(5, QSize(500, 1000), strip=0, shape_aspect=4.0) == 1
+    assert columns_for(5, QSize(1960, 1400), strip=0, shape_aspect=0.9) == 3
+    assert columns_for(1, QSize(1400, 1000), strip=0, shape_aspect=0.9) == 1
+
+
+def test_words_and_colour_bars_count_as_lost_height():
+    """Two rows would leave each shape 222 px, four columns 300."""
+    assert columns_for(4, QSize(660, 696), strip=38, shape_aspect=0.55) == 4
+    assert columns_for(4, QSize(660, 696), strip=38, shape_aspect=1.0) == 2
+
+
+def test_no_panel_is_narrower_than_its_caption():
+    assert columns_for(5, QSize(460, 700), strip=38, shape_aspect=0.3) == 3
+    assert columns_for(5, QSize(120, 700), strip=38, shape_aspect=0.3) == 1
