@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from naisr_viewer.panels import before, change, effect, scan, shape, template, uncertainty
+from naisr_viewer.panels import before, change, deviation, effect, scan, shape, template, uncertainty
 from naisr_viewer.panels.base import PanelKind
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState
@@ -23,6 +23,7 @@ KINDS: dict[str, PanelKind] = {
         shape.KIND,
         scan.KIND,
         uncertainty.KIND,
+        deviation.KIND,
         change.KIND,
     )
 }

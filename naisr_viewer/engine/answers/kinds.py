@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from naisr_viewer.engine.answers import change, effect, scan, shape, template, uncertainty
+from naisr_viewer.engine.answers import change, deviation, effect, scan, shape, template, uncertainty
 from naisr_viewer.engine.answers.base import Answer
 
 ANSWERS: dict[str, Answer] = {
@@ -12,6 +12,7 @@ ANSWERS: dict[str, Answer] = {
     "shape": shape.ANSWER,
     "scan": scan.ANSWER,
     "uncertainty": uncertainty.ANSWER,
+    "deviation": deviation.ANSWER,
     "change": change.ANSWER,
 }
 """One line a kind, as among the panels."""

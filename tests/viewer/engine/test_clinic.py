@@ -26,6 +26,7 @@ from naisr_viewer.state.patients import OpenScan, Reading
 BEFORE = Panel("before")
 UNCERTAINTY = Panel("uncertainty")
 CHANGE = Panel("change")
+DEVIATION = Panel("deviation")
 SCAN = Panel("scan")
 
 KNOWN = (("age", 6.0), ("sex", 1.0))
@@ -126,6 +127,28 @@ def test_uncertainty_is_positive_and_grows_with_what_is_not_known(desk, egg_atla
     clinic.forget(fit)
     with pytest.raises(Cancelled):
         engine.surface(request_for(untold, UNCERTAINTY, 128))
+
+
+@pytest.mark.parametrize("codes", [0.0, 8.0])
+def test_the_deviation_from_the_average_is_what_sets_a_patient_apart(egg_atlas, tmp_path, codes):
+    """Integrated over the surface it is the difference of the volumes, to first order."""
+    atlas, file = Atlas.load(egg_atlas), tmp_path / "someone.stl"
+    atlas.shape(dict(KNOWN), codes * atlas.checkpoint.latents[0], 64).export(file)
+    engine = Engine(folder=tmp_path / "cache")
+    clinic, state = Clinic(engine), opened(ExplorerState(), engine.open(egg_atlas))
+    scan = clinic.read(egg_atlas, Reading(file), KNOWN)
+    fit = clinic.fit(egg_atlas, scan, KNOWN)
+    state = with_patient(state, OpenScan(1, file.name, Reading(file), scan, KNOWN, fit))
+    told = engine.surface(request_for(state, DEVIATION, 128))
+    average = engine.surface(replace(request_for(state, FULL_SHAPE, 128), person=0))
+    area_mm2 = trimesh.Trimesh(told.points_mm, told.faces, process=False).area
+    gained_cm3 = told.colouring.values.mean() * area_mm2 / 1000
+    assert gained_cm3 == pytest.approx(told.volume_cm3 - average.volume_cm3, abs=0.2)
+    if codes == 0:
+        np.testing.assert_allclose(told.colouring.values, 0, atol=0.3)
+    else:
+        assert np.abs(told.colouring.values).max() > 0.5
+    assert engine.surface(request_for(state, DEVIATION, 40)).colouring is None
 
 
 def test_a_change_is_counted_along_the_normals_from_point_to_point(desk):

@@ -408,7 +408,7 @@ def test_a_colour_bar_stands_between_shape_and_caption(views, card):
     for panels in (panels_in(layout, card) for layout in Layout):
         views.show_panels(panels)
         with_bar |= {panel for panel in panels if beneath(views, panel, ColourBar) is not None}
-    assert with_bar == {SCAN, UNCERTAINTY, CHANGE}
+    assert with_bar == {SCAN, UNCERTAINTY, Panel("deviation"), CHANGE}
     views.show_panels(panels_in(Layout.FIT, card))
     bar, shape, below = beneath(views, SCAN, ColourBar), inside(views, SCAN)[0], caption(views, SCAN)
     assert bar is not None
