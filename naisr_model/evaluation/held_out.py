@@ -48,16 +48,16 @@ def opened(path: Path) -> Atlas:
     return _opened(path, _changed(path))
 
 
-def _changed(path: Path) -> tuple[int, int]:
-    """What tells a file from another one at its place."""
+def _changed(path: Path) -> tuple[int, ...]:
+    """What tells a file from another one at its place; clocks are coarse, so its own number as well."""
     if not path.exists():
-        return 0, 0
+        return ()
     status = path.stat()
-    return status.st_mtime_ns, status.st_size
+    return status.st_mtime_ns, status.st_size, status.st_ino
 
 
 @lru_cache(maxsize=2)
-def _opened(path: Path, _changed: tuple[int, int]) -> Atlas:
+def _opened(path: Path, _changed: tuple[int, ...]) -> Atlas:
     return Atlas.load(path)
 
 
@@ -71,7 +71,7 @@ def opened_store(path: Path) -> SampleStore:
 
 
 @lru_cache(maxsize=2)
-def _opened_store(path: Path, _changed: tuple[int, int]) -> SampleStore:
+def _opened_store(path: Path, _changed: tuple[int, ...]) -> SampleStore:
     return SampleStore.open(path)
 
 
