@@ -1,8 +1,10 @@
 """``Atlas``: a trained population of shapes, in real units and millimetres.
 
->>> atlas = Atlas.load("resources/airway.safetensors")            # doctest: +SKIP
->>> boy = atlas.shape({"age": 120, "weight": 34, "sex": +1})      # doctest: +SKIP
->>> boy.volume / 1000                                             # cm3  # doctest: +SKIP
+>>> from naisr_model.shipped import shipped_atlas
+>>> atlas = Atlas.load(shipped_atlas())
+>>> boy = atlas.shape({"age": 120, "weight": 34, "sex": +1}, resolution=64)
+>>> 40 < boy.volume / 1000 < 55  # cm³
+True
 """
 
 from __future__ import annotations
@@ -76,7 +78,7 @@ class Atlas:
     ``atlas.covariates``; a binary covariate is -1 or +1, or between them); what is left out is at
     the population centre. ``latent`` is a code z ``[L]``; left out, it is 0, the population
     average. Surfaces are ``trimesh.Trimesh`` in millimetres with outward faces, so their
-    ``volume / 1000`` is in cm3; where no surface exists they have no faces. ``resolution`` is the
+    ``volume / 1000`` is in cm³; where no surface exists they have no faces. ``resolution`` is the
     number of cells along a side of the box, a multiple of 8. ``progress`` is told the finished share, and
     ends a computation that nobody waits for any more with :class:`~naisr_model.errors.Cancelled`.
 

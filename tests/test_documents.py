@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ast
 import doctest
+import importlib
 import os
 import re
 import shlex
@@ -163,6 +164,18 @@ def test_python_in_the_readme_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     assert found["distance_mm"].shape == (1,)
     low, high = fit.intervals["weight"]
     assert low <= 34 <= high
+
+
+def test_sessions_in_modules_run() -> None:
+    files = [file for package in ("naisr_model", "naisr_viewer") for file in (ROOT / package).rglob("*.py")]
+    names = [
+        ".".join(file.relative_to(ROOT).with_suffix("").parts)
+        for file in files
+        if ">>>" in file.read_text(encoding="utf-8")
+    ]
+    results = [doctest.testmod(importlib.import_module(name)) for name in names]
+    assert sum(result.failed for result in results) == 0
+    assert len(results) > 2 and all(result.attempted for result in results)
 
 
 def test_sessions_in_documents_run(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,7 +1,6 @@
 """One patient's shape: reading it from any file, finding what is wrong with it, and setting that right.
 
->>> patient = read_patient("scan.nii.gz", label=2)  # doctest: +SKIP
->>> patient, done, left = repaired(patient, atlas.frame)  # doctest: +SKIP
+:func:`read_patient`, then :func:`repaired`, which also says what it did and what is left.
 """
 
 from __future__ import annotations

@@ -1,11 +1,8 @@
 """A patient's file brought into the frame of an atlas: read, repaired, aligned and checked.
 
-:func:`take_in` does all of it; a window goes step by step:
-
->>> choices = labels(path)  # None, or what to choose from  # doctest: +SKIP
->>> intake = read(path, atlas, label=2)  # shows intake.sentences and intake.findings  # doctest: +SKIP
->>> moved = aligned(intake, atlas, {"age": 84}, "icp")  # shows moved.proposal  # doctest: +SKIP
->>> fit = atlas.fit(moved.patient.mesh_mm, {"age": 84})  # if moved.is_ready  # doctest: +SKIP
+:func:`take_in` does all of it; a window goes step by step: :func:`labels` says what there is to choose from,
+:func:`read` gives an :class:`Intake` with its sentences and findings, :func:`aligned` moves it and shows the
+proposal, and what ``is_ready`` can be fitted.
 """
 
 from __future__ import annotations

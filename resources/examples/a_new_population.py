@@ -152,5 +152,5 @@ if __name__ == "__main__":
     for covariate in store.population.covariates:
         print(f"{covariate.name}: {' to '.join(map(covariate.format, covariate.range))}")
     for _, _, values in growth_path():
-        print(f"true volume at {values['age']:g} years: {true_shape(values).volume / 1000:.2f} cm3")
+        print(f"true volume at {values['age']:g} years: {true_shape(values).volume / 1000:.2f} cm³")
     print(f"everything is in {folder}; next: naisr train {folder / 'store'} --out bones.safetensors")

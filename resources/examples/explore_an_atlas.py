@@ -35,9 +35,9 @@ for covariate in atlas.covariates:
 
 # %% The template, and what age alone does to it. A covariate that is not named is at the population centre.
 template = atlas.template()
-print(f"template: {volume_cm3(template):.2f} cm3, {len(template.vertices)} vertices")
+print(f"template: {volume_cm3(template):.2f} cm³, {len(template.vertices)} vertices")
 for months in (24, 120, 200):
-    print(f"age only, {months} months: {volume_cm3(atlas.effect('age', months, resolution=64)):.2f} cm3")
+    print(f"age only, {months} months: {volume_cm3(atlas.effect('age', months, resolution=64)):.2f} cm³")
 
 # %% Age and weight go together: the growth path is the mean of the others at each age.
 ages = np.array([60.0, 90.0, 117.0, 170.0, 220.0])
@@ -45,7 +45,7 @@ for values in growth_path(atlas.population, "age", ages):
     child = dict(zip(atlas.population.names, map(float, values), strict=True)) | {"sex": 1.0}
     shape = atlas.shape(child, resolution=80)
     shape.export(OUT / f"boy_{child['age']:.0f}_months.ply")
-    print(f"boy of {child['age']:.0f} months and {child['weight']:.1f} kg: {volume_cm3(shape):.2f} cm3")
+    print(f"boy of {child['age']:.0f} months and {child['weight']:.1f} kg: {volume_cm3(shape):.2f} cm³")
 
 # %% Signed distances in millimetres, negative inside; on the surface they are 0.
 distances_mm = atlas.sdf(template.vertices[::50], {})

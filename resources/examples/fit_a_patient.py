@@ -24,7 +24,7 @@ airways.write_population(OUT / "hospital", seed=SEED, patients=CHILDREN)
 visit = min(airways.visits(SEED, CHILDREN), key=lambda one: abs(one.values["age"] - 90))
 name = f"{visit.subject}_{visit.visit}"
 print("the truth: " + ", ".join(f"{covariate} {value:.1f}" for covariate, value in visit.values.items()))
-print(f"true volume: {airways.visit_shape(visit)[0].volume / 1000:.2f} cm3")
+print(f"true volume: {airways.visit_shape(visit)[0].volume / 1000:.2f} cm³")
 
 # %% Read the file, set right what is wrong with it, and move it onto the atlas by its landmarks.
 atlas = Atlas.load(shipped_atlas())
@@ -39,7 +39,7 @@ fit = atlas.fit(taken.patient.mesh_mm, known)
 low, high = fit.intervals["weight"]
 print(f"weight: {fit.covariates['weight']:.1f} kg, 95 %: {low:.1f} to {high:.1f} kg")
 low, high = fit.volume_interval_cm3
-print(f"volume: {fit.volume_cm3:.2f} cm3, 95 %: {low:.2f} to {high:.2f} cm3")
+print(f"volume: {fit.volume_cm3:.2f} cm³, 95 %: {low:.2f} to {high:.2f} cm³")
 print(f"mean distance of the scan to the fitted surface: {fit.residual_mm:.2f} mm, in {fit.seconds:.1f} s")
 for sentence in fit.remarks:
     print(sentence)
@@ -48,7 +48,7 @@ fit.shape().export(OUT / "fitted.ply")
 # %% Another day: only what is expected to last of this child is kept, so the interval is much wider.
 later = fit.at({"age": known["age"] + 36, "weight": fit.covariates["weight"] + 9})
 low, high = later.volume_interval_cm3
-print(f"three years later: {later.volume_cm3:.2f} cm3, 95 %: {low:.2f} to {high:.2f} cm3")
+print(f"three years later: {later.volume_cm3:.2f} cm³, 95 %: {low:.2f} to {high:.2f} cm³")
 print(f"there {fit.lasting:.0%} of what sets this child apart is kept")
 later.shape().export(OUT / "later.ply")
 print(f"surfaces are in {OUT}")

@@ -73,5 +73,5 @@ print(f"trained for {checkpoint.training['iterations']} iterations")
 atlas = Atlas.load(OUT / "eggs.safetensors")
 for years, level in ((2.0, -1.0), (5.0, 1.0), (8.0, 1.0)):
     found = atlas.shape({"age": years, "sex": level}, resolution=64).volume / 1000
-    print(f"age {years:g}, sex {level:+g}: {found:.2f} cm3, true {true_cm3(years, level):.2f} cm3")
+    print(f"age {years:g}, sex {level:+g}: {found:.2f} cm³, true {true_cm3(years, level):.2f} cm³")
 print(f"everything is in {OUT}")

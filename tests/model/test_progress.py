@@ -1,10 +1,7 @@
 """Shares that add up, and work that stops."""
 
-import doctest
-
 import pytest
 
-from naisr_model import progress as module
 from naisr_model.errors import Cancelled
 from naisr_model.progress import SILENT, Progress
 
@@ -38,7 +35,3 @@ def test_a_quiet_piece_tells_nothing_and_still_stops():
 
 def test_nothing_to_do_is_fine():
     assert list(SILENT.over(())) == []
-
-
-def test_the_example_in_its_docstring_runs():
-    assert doctest.testmod(module).failed == 0
