@@ -12,7 +12,7 @@ from naisr_model.errors import Cancelled
 from naisr_viewer.control import jobs
 from naisr_viewer.control.worker import Deliver, Job, Worker
 from naisr_viewer.engine.engine import Engine
-from naisr_viewer.panels.kinds import answers, caption_of, missing, request_for, visible_panels
+from naisr_viewer.panels.kinds import caption_of, missing, request_for, shows, visible_panels
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Panel
 from naisr_viewer.state.requests import EXACT_RESOLUTION, PREVIEW_RESOLUTION, SurfaceRequest, SurfaceResult
@@ -155,7 +155,7 @@ class Refinement(QObject):
         if panel not in visible_panels(self._state):
             return False
         wanted = request_for(self._state, panel, asked.resolution)
-        if answers(self.shown.get(panel), wanted):
+        if shows(self.shown.get(panel), wanted):
             return False
         return asked == (replace(wanted, values=asked.values) if self._is_moving else wanted)
 

@@ -71,11 +71,8 @@ class Atlases:
         """Whether nothing has taken its place."""
         return self._opened.get(opened.card.path) is opened
 
-    def open(self, path: Path) -> tuple[Opened, list[Path]]:
-        """Read ``path`` afresh.
-
-        Returns:
-            The open atlas, and the files of which nothing that was open before is open any more.
+    def read(self, path: Path) -> tuple[Opened, Atlas | None]:
+        """What :meth:`begin` takes: a file read afresh, with its networks where they had to be loaded.
 
         Raises:
             InputError: when there is no such file or it is not an atlas of surfaces.
@@ -84,16 +81,33 @@ class Atlases:
             raise InputError(f"there is no file {path}; give the path of an atlas (.safetensors)")
         fingerprint = fingerprint_of(path)
         if (kept := self._cache.opening(fingerprint, path)) is not None:
-            return self._begin(Opened(kept.card, fingerprint, kept.picture), None)
+            return Opened(kept.card, fingerprint, kept.picture), None
         atlas = self._load(path)
         if atlas.frame.dim != 3:
             raise InputError(
                 f"{path.name} is an atlas of {atlas.frame.dim}D shapes; the viewer shows 3D ones"
             )
         if fingerprint_of(path) != fingerprint:  # replaced meanwhile, as a training does now and then
-            return self.open(path)
+            return self.read(path)
         card = AtlasCard(path, atlas.name, atlas.covariates, atlas.population, atlas.capabilities)
-        return self._begin(Opened(card, fingerprint, None), atlas)
+        return Opened(card, fingerprint, None), atlas
+
+    def begin(self, opened: Opened, atlas: Atlas | None) -> list[Path]:
+        """Have an atlas open in place of what was open of its file, and of what is one too many.
+
+        Returns:
+            The files of which nothing that was open before is open any more.
+        """
+        path, closed = opened.card.path, [opened.card.path]
+        with self._lock:
+            self._forget(path)
+            self._opened[path] = opened
+            if atlas is not None:
+                self._networks[path] = atlas
+            while len(self._opened) > OPEN_ATLASES:
+                closed.append(next(iter(self._opened)))
+                self._forget(closed[-1])
+        return closed
 
     def network(self, path: Path) -> Atlas:
         """An open atlas with its networks.
@@ -113,18 +127,6 @@ class Atlases:
                     if self.is_open(opened):
                         self._networks[path] = atlas
             return atlas
-
-    def _begin(self, opened: Opened, atlas: Atlas | None) -> tuple[Opened, list[Path]]:
-        path, closed = opened.card.path, [opened.card.path]
-        with self._lock:
-            self._forget(path)
-            self._opened[path] = opened
-            if atlas is not None:
-                self._networks[path] = atlas
-            while len(self._opened) > OPEN_ATLASES:
-                closed.append(next(iter(self._opened)))
-                self._forget(closed[-1])
-        return opened, closed
 
     def _forget(self, path: Path) -> None:
         self._opened.pop(path, None)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from naisr_model.errors import Cancelled
 from naisr_model.progress import SILENT, Progress
-from naisr_viewer.engine.answers.base import Who, simplest
+from naisr_viewer.engine.answers.base import Who
 from naisr_viewer.engine.answers.kinds import ANSWERS
 from naisr_viewer.engine.atlases import Atlases, Opened, load_atlas
 from naisr_viewer.engine.cache import Cache, Opening, cache_folder, first_picture
@@ -60,8 +60,9 @@ class Engine:
         Raises:
             InputError: when there is no such file or it is not an atlas of surfaces.
         """
-        opened, closed = self._atlases.open(path)
-        with self._lock:
+        opened, atlas = self._atlases.read(path)
+        with self._lock:  # what belongs to another file is gone before anybody can ask of this one
+            closed = self._atlases.begin(opened, atlas)
             self._members = {key: each for key, each in self._members.items() if each.atlas not in closed}
             self._forget_surfaces(lambda atlas, _: atlas in closed)
             if opened.picture is not None:
@@ -134,7 +135,7 @@ class Engine:
         opened, question = self._atlases[request.atlas], self._question(request)
         answer = ANSWERS[question.panel.kind]
         result = answer.give(self, question, progress)
-        if result.is_exact or (answer.is_plain and result.origin is Origin.NETWORK):
+        if result.is_exact or (answer.is_kept_coarse and result.origin is Origin.NETWORK):
             self._remember(opened, result)
         return replace(result, request=request)
 
@@ -187,8 +188,7 @@ class Engine:
 
     def _question(self, request: SurfaceRequest) -> SurfaceRequest:
         """What is computed and remembered for ``request``."""
-        is_plain = ANSWERS[request.panel.kind].is_plain
-        return simplest(request, self._atlases[request.atlas].card) if is_plain else request
+        return ANSWERS[request.panel.kind].question(request, self._atlases[request.atlas].card)
 
     def _remember(self, opened: Opened, result: SurfaceResult) -> None:
         """Unless the atlas was opened anew, or the person dismissed, meanwhile."""

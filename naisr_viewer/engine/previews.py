@@ -63,7 +63,7 @@ class Previews:
         return preview
 
     def track(self, request: SurfaceRequest, tracker: Tracker) -> Tracked:
-        """Carry the template, beginning where the sub-plot's last preview ended."""
+        """Carry the template, beginning where the last preview of the same surface ended."""
         key = (request.atlas, request.person, request.panel)
         tracked = tracker.track(dict(request.values), self._tracked.get(key))
         if tracked.is_trustworthy:

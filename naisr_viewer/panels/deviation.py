@@ -8,16 +8,17 @@ from naisr_viewer.words.captions import LATER, Caption, beyond, large
 
 HINT = (
     "Distance of the patient's surface to that of the population's average at the same covariates, in mm: "
-    f"positive where the patient's lies outside.{LATER}"
+    "positive where the patient's lies outside."
 )
 
 
-def _mean_distance(result: SurfaceResult) -> Caption:
+def _extremes(result: SurfaceResult) -> Caption:
+    hint = HINT + (LATER if result.request.values else "")
     if result.colouring is None:
-        return Caption(large("…"), HINT)
+        return Caption(large("…"), hint)
     inside, outside = result.colouring.values.min(), result.colouring.values.max()
     ends = f"{inside:+.1f} to {outside:+.1f} mm".replace("-", "−")
-    return Caption(large(ends) + f"<br>from the average{beyond(result.colouring)}", HINT)
+    return Caption(large(ends) + f"<br>from the average{beyond(result.colouring)}", hint)
 
 
 KIND = PanelKind(
@@ -29,7 +30,7 @@ KIND = PanelKind(
     ),
     layouts=frozenset({Layout.FIT}),
     ask=ask_full_shape,
-    caption=caption_of(_mean_distance),
+    caption=caption_of(_extremes),
     colour=shape.COLOUR,
     scale="signed",
 )

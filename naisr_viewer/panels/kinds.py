@@ -62,6 +62,13 @@ def layouts_of(atlas: AtlasCard) -> tuple[Layout, ...]:
     return tuple(each for each in Layout if each is Layout.FULL_SHAPE or panels_in(each, atlas) != alone)
 
 
+def with_layout_of(state: ExplorerState) -> ExplorerState:
+    """``state`` in a layout that there is for its atlas."""
+    if state.atlas is None or state.layout in layouts_of(state.atlas):
+        return state
+    return replace(state, layout=Layout.FULL_SHAPE)
+
+
 def visible_panels(state: ExplorerState) -> tuple[Panel, ...]:
     """The panels of the present layout; none without an atlas."""
     return () if state.atlas is None else panels_in(state.layout, state.atlas)
@@ -72,7 +79,7 @@ def request_for(state: ExplorerState, panel: Panel, resolution: int) -> SurfaceR
     return kind_of(panel).ask(state, panel, resolution)
 
 
-def answers(result: SurfaceResult | None, request: SurfaceRequest) -> bool:
+def shows(result: SurfaceResult | None, request: SurfaceRequest) -> bool:
     """Whether ``result`` shows what ``request`` asks for, at least as finely."""
     if result is None or result.request.resolution < request.resolution:
         return False
@@ -84,4 +91,4 @@ def missing(
 ) -> list[SurfaceRequest]:
     """What ``state`` wants at ``resolution`` and is not among ``shown`` yet, the full shape first."""
     wanted = [request_for(state, panel, resolution) for panel in reversed(visible_panels(state))]
-    return [request for request in wanted if not answers(shown.get(request.panel), request)]
+    return [request for request in wanted if not shows(shown.get(request.panel), request)]

@@ -72,18 +72,22 @@ class Answer:
 
     Attributes:
         give: the result, whose request is the one that was asked; raises ``Cancelled`` when nobody waits.
-        is_plain: whether it is nothing but a surface: requests with the same one then share an answer, see
-            :func:`simplest`.
+        question: the request that is answered and remembered for one that shares its answer; itself when
+            left out.
+        is_kept_coarse: whether a coarse answer of the networks is complete, so that it is remembered as an
+            exact one is.
     """
 
     give: Callable[[Source, SurfaceRequest, Progress], SurfaceResult]
-    is_plain: bool = False
+    question: Callable[[SurfaceRequest, AtlasCard], SurfaceRequest] = lambda request, _: request
+    is_kept_coarse: bool = False
 
 
-def plain(make: Make) -> Answer:
-    """A surface, from the tables while it moves and from the networks at rest.
+def field_of_the_model(make: Make) -> Answer:
+    """The surface of Phi, of a Phi_i or of T: from the tables while it moves, from the networks at rest.
 
     A person's has the margin of its volume at rest, and where there was a preview, how far off that was.
+    Requests with one and the same surface share an answer, see :func:`simplest`.
     """
 
     def give(source: Source, request: SurfaceRequest, progress: Progress) -> SurfaceResult:
@@ -103,17 +107,17 @@ def plain(make: Make) -> Answer:
             result = replace(result, preview_error_mm=error_mm)
         return result
 
-    return Answer(give, is_plain=True)
+    return Answer(give, simplest, is_kept_coarse=True)
 
 
 def simplest(request: SurfaceRequest, atlas: AtlasCard) -> SurfaceRequest:
     """The request with the fewest covariates that has the same surface as ``request``.
 
     g_i vanishes where covariate i is at its centre, so Phi with a single covariate off its centre is
-    that covariate's Phi_i, and with none it is the template T, whoever it is. Of other shape models nothing
-    of the kind is known.
+    that covariate's Phi_i, and with none it is the template T, whoever it is. Of shape models that know no
+    Phi_i, or where g_i does not vanish, nothing of the kind is known.
     """
-    if not atlas.capabilities.vanishes_at_centre:
+    if not (atlas.capabilities.vanishes_at_centre and atlas.capabilities.disentangleable):
         return request
     centre = {covariate.name: covariate.centre for covariate in atlas.covariates}
     moved = tuple((name, value) for name, value in request.values if value != centre[name])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from naisr_model.progress import SILENT, Progress
+from naisr_model.progress import Progress
 from naisr_viewer.engine.answers.base import Answer, Source
 from naisr_viewer.engine.members import Member
 from naisr_viewer.engine.surfaces import at_nearest, limit_mm, volume_cm3
@@ -45,7 +45,7 @@ def _give(source: Source, request: SurfaceRequest, progress: Progress) -> Surfac
     return replace(
         shape,
         colouring=_moved(member, before_mm, shape),
-        volume_before_cm3=_volume_before_cm3(source, request, first, tracker.faces),
+        volume_before_cm3=_volume_before_cm3(source, request, first, tracker.faces, progress.quiet),
         doubtful=shape.doubtful or not (first.is_trustworthy and later.is_trustworthy),
     )
 
@@ -57,7 +57,7 @@ def _moved(member: Member, before_mm: NDArray[np.float32], shape: SurfaceResult)
 
 
 def _volume_before_cm3(
-    source: Source, request: SurfaceRequest, first: Tracked, faces: NDArray[np.int64]
+    source: Source, request: SurfaceRequest, first: Tracked, faces: NDArray[np.int64], progress: Progress
 ) -> float:
     """Of the same kind as the later volume: both exact, or both of previews."""
     assert request.before is not None
@@ -65,7 +65,7 @@ def _volume_before_cm3(
         return volume_cm3(first.points_mm, first.normals, faces)
     person, values = request.before
     before = replace(request, panel=FULL_SHAPE, person=person, values=values, before=None)
-    return source.surface(before, SILENT).volume_cm3
+    return source.surface(before, progress).volume_cm3
 
 
 ANSWER = Answer(_give)

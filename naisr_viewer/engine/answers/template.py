@@ -1,7 +1,7 @@
 """The template."""
 
-from naisr_viewer.engine.answers.base import plain
+from naisr_viewer.engine.answers.base import field_of_the_model
 
-ANSWER = plain(
+ANSWER = field_of_the_model(
     lambda atlas, request, _latent, _tracker, progress: atlas.template(request.resolution, progress=progress)
 )

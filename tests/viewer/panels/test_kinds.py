@@ -7,9 +7,9 @@ from dataclasses import replace
 from naisr_viewer.engine.answers.kinds import ANSWERS
 from naisr_viewer.panels.kinds import (
     KINDS,
-    answers,
     layouts_of,
     panels_in,
+    shows,
     title_of,
     visible_panels,
 )
@@ -53,7 +53,7 @@ def test_layouts_show_their_panels_in_order(card):
 
 def test_a_finer_surface_answers_a_coarser_question(engine, card):
     fine = engine.surface(ask(card, age=50.0))
-    assert answers(fine, ask(card, resolution=40, age=50.0))
-    assert not answers(fine, ask(card, resolution=256, age=50.0))
-    assert not answers(fine, ask(card, resolution=40, age=51.0))
-    assert not answers(None, ask(card))
+    assert shows(fine, ask(card, resolution=40, age=50.0))
+    assert not shows(fine, ask(card, resolution=256, age=50.0))
+    assert not shows(fine, ask(card, resolution=40, age=51.0))
+    assert not shows(None, ask(card))
