@@ -97,6 +97,8 @@ def parse_settings(card: AtlasCard, settings: Sequence[str]) -> dict[str, float]
         InputError: for an unknown covariate, no number, or a value outside the observed range.
     """
     known = {covariate.name: covariate for covariate in card.covariates}
+    if settings and not known:
+        raise InputError(f"leave out --set: the shapes of {card.path.name} depend on no covariates")
     values = {}
     for setting in settings:
         name, equals, text = setting.partition("=")

@@ -19,7 +19,7 @@ from naisr_viewer.control.refinement import Refinement
 from naisr_viewer.control.worker import Worker
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.files.surfaces import write_atomically
-from naisr_viewer.panels.kinds import layouts_of
+from naisr_viewer.panels.kinds import with_layout_of
 from naisr_viewer.state.atlas_card import AtlasCard, RealVector
 from naisr_viewer.state.explorer import ExplorerState, followed, opened, reset, reset_all, with_value
 from naisr_viewer.state.history import History, record, redo, undo
@@ -92,8 +92,6 @@ class Controller(QObject):
         self._preferences.remember(card.path)
         self._window.show_recent(self._preferences.recent)
         state = opened(self.state, card)
-        if state.layout not in layouts_of(card):
-            state = replace(state, layout=Layout.FULL_SHAPE)
         for name, value in values.items():
             state = with_value(state, name, value)
         self.go(state)
@@ -164,7 +162,8 @@ class Controller(QObject):
         self._window.show_theme(choice)
 
     def go(self, state: ExplorerState) -> None:
-        """Make ``state`` the present one."""
+        """Make ``state`` the present one, in a layout that its atlas has."""
+        state = with_layout_of(state)
         if (state.patient, state.person) != (self.state.patient, self.state.person):
             self._leave()
         self.state = state

@@ -12,7 +12,7 @@ from PySide6.QtTest import QTest
 from naisr_model.errors import InputError
 from naisr_viewer.control.controller import Controller
 from naisr_viewer.files import surfaces
-from naisr_viewer.panels.kinds import panels_in
+from naisr_viewer.panels.kinds import layouts_of, panels_in
 from naisr_viewer.state.layouts import FULL_SHAPE, Layout
 from naisr_viewer.state.requests import EXACT_RESOLUTION, ExportChoice
 from naisr_viewer.views.covariates.row import CovariateRow
@@ -77,40 +77,57 @@ def drag(row: CovariateRow, start: float, end: float) -> None:
 def run_demo(window: MainWindow, controller: Controller, folder: Path) -> None:
     """Drag every slider from end to end with real mouse events; leave pictures and meshes behind.
 
-    At last a full shape that was exported is opened as if it were a patient's, fitted and moved.
+    At last a full shape that was exported is opened as if it were a patient's, fitted and moved. What the
+    atlas cannot do is left out.
 
     Raises:
         InputError: when the window reports an error.
     """
-
-    def picture(name: str) -> None:
-        finish(window, controller)
-        controller.save_screenshot(folder / f"{name}.png")
-
-    picture("start")
+    _picture(window, controller, folder / "start.png")
     for name, row in window.covariates.rows.items():
         drag(row, 0.5, 1.0)
-        picture(f"{name}-high")
+        _picture(window, controller, folder / f"{name}-high.png")
         drag(row, 1.0, 0.0)
-        picture(f"{name}-low")
+        _picture(window, controller, folder / f"{name}-low.png")
         row.reset.click()
         print(f"dragged {name} from {row.reach}", flush=True)
-    controller.set_layout(Layout.FULL_SHAPE)
-    name, row = next(iter(window.covariates.rows.items()))
-    drag(row, 0.5, 0.75)
-    picture("full-shape")
-    atlas = controller.state.atlas
+    scan = _export_moved(window, controller, folder)
+    _fit_and_move(window, controller, folder, scan)
+    print(f"wrote pictures and meshes into {folder.absolute()}")
+
+
+def _picture(window: MainWindow, controller: Controller, path: Path) -> None:
+    finish(window, controller)
+    controller.save_screenshot(path)
+
+
+def _export_moved(window: MainWindow, controller: Controller, folder: Path) -> Path:
+    """Export everything with the first covariate off its centre; returns the file of the full shape."""
+    atlas, rows = controller.state.atlas, list(window.covariates.rows.values())
     assert atlas is not None
+    controller.set_layout(Layout.FULL_SHAPE)
+    for row in rows[:1]:
+        drag(row, 0.5, 0.75)
+    _picture(window, controller, folder / "full-shape.png")
     everything = panels_in(Layout.SIDE_BY_SIDE, atlas)
     controller.export(ExportChoice(everything, "stl", EXACT_RESOLUTION, folder))
     finish(window, controller)
-    row.reset.click()
-    window.scan_requested.emit(folder / f"{surfaces.file_stem(atlas, controller.shown[FULL_SHAPE])}.stl")
+    for row in rows[:1]:
+        row.reset.click()
+    return folder / f"{surfaces.file_stem(atlas, controller.shown[FULL_SHAPE])}.stl"
+
+
+def _fit_and_move(window: MainWindow, controller: Controller, folder: Path, scan: Path) -> None:
+    atlas = controller.state.atlas
+    assert atlas is not None
+    window.scan_requested.emit(scan)
     finish(window, controller)
     window.patients.known.fit.click()
-    picture("patient-fit")
-    controller.set_layout(Layout.CHANGE)
-    drag(row, row.slider.sliderPosition() / SLIDER_STEPS, 0.25)
-    picture("patient-before-and-after")
-    print(f"fitted the exported full shape and moved it along {name}")
-    print(f"wrote pictures and meshes into {folder.absolute()}")
+    _picture(window, controller, folder / "patient-fit.png")
+    print("fitted the exported full shape")
+    if Layout.CHANGE in layouts_of(atlas):
+        controller.set_layout(Layout.CHANGE)
+        name, row = next(iter(window.covariates.rows.items()))
+        drag(row, row.slider.sliderPosition() / SLIDER_STEPS, 0.25)
+        _picture(window, controller, folder / "patient-before-and-after.png")
+        print(f"moved it along {name}")

@@ -87,7 +87,7 @@ class SurfaceResult:
             lay; None where there was no preview by tabulated displacements.
         volume_margin_cm3: half of the volume's 95 % interval; None for the population average.
         volume_before_cm3: of a change: the volume that it is counted from.
-        colouring: of a scan, a change or an uncertainty at rest; else None.
+        colouring: of a kind of view with numbers on its surface, at rest; else None.
     """
 
     request: SurfaceRequest

@@ -1,4 +1,4 @@
-"""Which colour stands for how many millimetres."""
+"""Which colour stands for which number."""
 
 from __future__ import annotations
 

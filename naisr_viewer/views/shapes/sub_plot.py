@@ -56,6 +56,6 @@ def set_colouring(plot: SubPlot, colouring: Colouring | None) -> None:
     for name, value in (SHINY if colouring is None else MATT).items():
         setattr(plot.actor.prop, name, value)
     if colouring is not None:
-        plot.mesh.point_data.set_scalars(colouring.values, "mm")
+        plot.mesh.point_data.set_scalars(colouring.values, "numbers")
         mapper.lookup_table = look_up_table(colouring.limit, colouring.scale)
         mapper.use_lookup_table_scalar_range = True

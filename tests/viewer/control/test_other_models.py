@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import dataclasses
 import gc
-from pathlib import Path
 
 import pytest
 from eggs import egg
 from PySide6.QtGui import QAction
 
-from naisr_model.config import SirenConfig
-from naisr_model.learning.training.loop import train
-from naisr_model.models.deepsdf import DeepSdfConfig
-from naisr_model.models.factory import preset
+from naisr_viewer.app import main
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.panels.kinds import all_panels, visible_panels
-from naisr_viewer.program.headless import finish
+from naisr_viewer.program.headless import finish, run_demo
 from naisr_viewer.program.start import make_window
 from naisr_viewer.state.layouts import FULL_SHAPE, Layout
 
@@ -24,23 +19,13 @@ TOLERATED = 0.06
 """Share of a volume by which a code that was trained for some seconds may be off."""
 
 
-@pytest.fixture(scope="module")
-def deepsdf_atlas(egg_store, tmp_path_factory) -> Path:
-    demo = preset("deepsdf-demo")
-    network = DeepSdfConfig(latent=4, shape=SirenConfig(32, 2, omega0=5.0))
-    training = dataclasses.replace(demo.training, epochs=300, batch_shapes=10, template_rate=2e-3)
-    out = tmp_path_factory.mktemp("deepsdf") / "eggs.safetensors"
-    train(egg_store, dataclasses.replace(demo, network=network, training=training), out)
-    return out
-
-
 @pytest.fixture
-def ready(qtbot, deepsdf_atlas, tmp_path):
+def ready(qtbot, egg_deepsdf, tmp_path):
     window, controller = make_window(Engine(folder=tmp_path / "cache"), tmp_path / "settings.ini")
     window.resize(1280, 800)
     window.show()
     qtbot.waitExposed(window)
-    controller.open(deepsdf_atlas)
+    controller.open(egg_deepsdf)
     finish(window, controller)
     yield window, controller
     window.close()
@@ -63,14 +48,14 @@ def test_what_the_model_cannot_do_is_absent(ready):
     assert texts.isdisjoint({"Side by side", "Before and after", "Reset all covariates"})
 
 
-def test_the_average_is_shown_exactly_and_again_at_the_next_start(ready, deepsdf_atlas, tmp_path):
+def test_the_average_is_shown_exactly_and_again_at_the_next_start(ready, egg_deepsdf, tmp_path):
     _, controller = ready
     assert controller.shown[FULL_SHAPE].is_exact
     again = Engine(folder=tmp_path / "cache")
-    again.prepare_previews(again.open(deepsdf_atlas).path)
+    again.prepare_previews(again.open(egg_deepsdf).path)
     third = Engine(folder=tmp_path / "cache")
-    third.open(deepsdf_atlas)
-    assert third.was_kept(deepsdf_atlas) and not third.has_previews(deepsdf_atlas)
+    third.open(egg_deepsdf)
+    assert third.was_kept(egg_deepsdf) and not third.has_previews(egg_deepsdf)
 
 
 def test_a_scan_is_fitted_by_its_code_alone(ready, tmp_path):
@@ -88,3 +73,20 @@ def test_a_scan_is_fitted_by_its_code_alone(ready, tmp_path):
     assert not window.patients.compare.isVisible()
     window.covariates.reset_all_requested.emit()
     assert controller.state.values == ()
+    window.patients.patient_chosen.emit(None)
+    finish(window, controller)
+    checked = {each.text() for each in window.findChildren(QAction) if each.isChecked() and each.isVisible()}
+    assert controller.state.layout is Layout.FULL_SHAPE and "Full shape" in checked
+
+
+def test_the_demonstration_leaves_out_what_cannot_be_shown(ready, tmp_path):
+    window, controller = ready
+    run_demo(window, controller, tmp_path)
+    pictures = {path.name for path in tmp_path.glob("*.png")}
+    assert pictures == {"start.png", "full-shape.png", "patient-fit.png"}
+    assert [path.name for path in tmp_path.glob("*.stl")] == ["eggs-full-shape.stl"]
+
+
+def test_a_setting_of_a_covariate_is_refused_in_words(egg_deepsdf, capsys):
+    assert main([str(egg_deepsdf), "--set", "age=3"]) == 2
+    assert "depend on no covariates" in capsys.readouterr().err
