@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from naisr_model.progress import SILENT, Progress
 from naisr_viewer.engine.engine import Engine
-from naisr_viewer.engine.members import Member
+from naisr_viewer.engine.people import FittedPerson
 from naisr_viewer.state.layouts import FULL_SHAPE
 from naisr_viewer.state.patients import Fitted, Labels, Named, Reading, Scan
 from naisr_viewer.state.requests import EXACT_RESOLUTION, SurfaceRequest
@@ -83,7 +83,7 @@ class Clinic:
         shape = patient.mesh_mm.vertices if patient.is_cloud else patient.mesh_mm
         fit = model.fit(shape, dict(known), progress=progress.part(0.0, FIT_SHARE))
         values = tuple(fit.covariates.items())
-        person = self._engine.admit(Member(atlas, fit, scan))
+        person = self._engine.admit(FittedPerson(atlas, fit, scan))
         try:
             surface = self._engine.surface(
                 SurfaceRequest(atlas, FULL_SHAPE, values, EXACT_RESOLUTION, person),

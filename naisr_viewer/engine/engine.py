@@ -17,7 +17,7 @@ from naisr_viewer.engine.answers.base import Who
 from naisr_viewer.engine.answers.kinds import ANSWERS
 from naisr_viewer.engine.atlases import Atlases, Opened, load_atlas
 from naisr_viewer.engine.cache import Cache, Opening, cache_folder, first_picture
-from naisr_viewer.engine.members import Member
+from naisr_viewer.engine.people import FittedPerson
 from naisr_viewer.engine.previews import Previews
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.layouts import TEMPLATE
@@ -49,7 +49,7 @@ class Engine:
         self._cache = Cache(folder or cache_folder())
         self._atlases = Atlases(load, self._cache)
         self._lock, self._preparing = Lock(), Lock()
-        self._members: dict[int, Member] = {}
+        self._people: dict[int, FittedPerson] = {}
         self._persons = count(1)
         self._results: OrderedDict[SurfaceRequest, SurfaceResult] = OrderedDict()
         self.previews = Previews()
@@ -63,7 +63,7 @@ class Engine:
         opened, atlas = self._atlases.read(path)
         with self._lock:  # what belongs to another file is gone before anybody can ask of this one
             closed = self._atlases.begin(opened, atlas)
-            self._members = {key: each for key, each in self._members.items() if each.atlas not in closed}
+            self._people = {key: each for key, each in self._people.items() if each.atlas not in closed}
             self._forget_surfaces(lambda atlas, _: atlas in closed)
             if opened.picture is not None:
                 self._results[opened.picture.request] = opened.picture
@@ -81,22 +81,22 @@ class Engine:
         """
         return self._atlases.network(path)
 
-    def admit(self, member: Member) -> int:
+    def admit(self, fitted: FittedPerson) -> int:
         """Answer for someone who was fitted, too; returns the number that requests name the person by."""
         with self._lock:
             person = next(self._persons)
-            self._members[person] = member
+            self._people[person] = fitted
         return person
 
     @property
     def persons(self) -> frozenset[int]:
         """Everyone who was fitted and is not forgotten."""
-        return frozenset(self._members)
+        return frozenset(self._people)
 
     def dismiss(self, person: int) -> None:
         """Forget someone."""
         with self._lock:
-            self._members.pop(person, None)
+            self._people.pop(person, None)
             self._forget_surfaces(lambda _, number: number == person)
 
     def who(self, path: Path, person: int) -> Who:
@@ -107,10 +107,10 @@ class Engine:
         """
         opened = self._atlases[path]
         with self._lock:
-            member = self._members.get(person)
-        if person and member is None:
+            fitted = self._people.get(person)
+        if person and fitted is None:
             raise Cancelled
-        return Who(opened.card, member, self.previews.tracker(path, person))
+        return Who(opened.card, fitted, self.previews.tracker(path, person))
 
     def cached(self, request: SurfaceRequest) -> SurfaceResult | None:
         """The answer, if it is remembered; instant."""
@@ -160,7 +160,7 @@ class Engine:
     def _prepare(self, path: Path, person: int, progress: Progress) -> None:
         import trimesh
 
-        opened, member = self._atlases[path], self.who(path, person).member
+        opened, fitted = self._atlases[path], self.who(path, person).fitted
         atlas, shown = self.atlas(path), self.surface(first_picture(opened.card), progress.quiet)
         if len(shown.faces) and opened.picture is None:
             self._cache.keep_opening(opened.fingerprint, Opening(opened.card, shown))
@@ -168,12 +168,12 @@ class Engine:
             return
         template = trimesh.Trimesh(shown.points_mm, shown.faces, process=False)
         tracker: Tracker
-        if member is None:
+        if fitted is None:
             tracker = atlas.tracker(template, self._tables(opened, atlas, template, progress))
         else:
-            tracker = member.fit.individual.tracker(template, progress=progress)
+            tracker = fitted.fit.individual.tracker(template, progress=progress)
         with self._lock:
-            if self._atlases.is_open(opened) and (not person or person in self._members):
+            if self._atlases.is_open(opened) and (not person or person in self._people):
                 self.previews.keep(path, person, tracker)
 
     def _tables(
@@ -194,7 +194,7 @@ class Engine:
         """Unless the atlas was opened anew, or the person dismissed, meanwhile."""
         question = result.request
         with self._lock:
-            if self._atlases.is_open(opened) and (not question.person or question.person in self._members):
+            if self._atlases.is_open(opened) and (not question.person or question.person in self._people):
                 self._results[question] = result
             while len(self._results) > CACHED_SURFACES:  # templates stay: all tables are made of one mesh
                 del self._results[next(each for each in self._results if each.panel != TEMPLATE)]

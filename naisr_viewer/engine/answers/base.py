@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from naisr_model.progress import Progress
-from naisr_viewer.engine.members import Member
+from naisr_viewer.engine.people import FittedPerson
 from naisr_viewer.engine.previews import Previews
 from naisr_viewer.engine.surfaces import deviation_mm, from_mesh
 from naisr_viewer.state.atlas_card import AtlasCard
@@ -37,12 +37,12 @@ class Who(NamedTuple):
 
     Attributes:
         card: of the open atlas.
-        member: who was fitted; None for the population average.
+        fitted: who was fitted; None for the population average.
         tracker: what carries the template for that person; None as long as previews are not prepared.
     """
 
     card: AtlasCard
-    member: Member | None
+    fitted: FittedPerson | None
     tracker: Tracker | None
 
 
@@ -91,16 +91,16 @@ def field_of_the_model(make: Make) -> Answer:
     """
 
     def give(source: Source, request: SurfaceRequest, progress: Progress) -> SurfaceResult:
-        _, member, tracker = source.who(request.atlas, request.person)
+        _, fitted, tracker = source.who(request.atlas, request.person)
         if tracker is not None and request.resolution < EXACT_RESOLUTION:
             return source.previews.surface(request, tracker)
         atlas, start = source.atlas(request.atlas), time.perf_counter()
-        latent = None if member is None else member.at(request.values).latent
+        latent = None if fitted is None else fitted.at(request.values).latent
         mesh = make(atlas, request, latent, tracker, progress)
         progress.check()
         result = from_mesh(request, mesh, start)
-        if member is not None and result.is_exact:
-            margin_cm3 = member.at(request.values).volume_margin_cm3(mesh)
+        if fitted is not None and result.is_exact:
+            margin_cm3 = fitted.at(request.values).volume_margin_cm3(mesh)
             result = replace(result, volume_margin_cm3=margin_cm3)
         if tracker is not None and len(result.faces):
             error_mm = deviation_mm(source.previews.track(request, tracker).points_mm, result)

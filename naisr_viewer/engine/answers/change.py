@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from naisr_model.progress import Progress
 from naisr_viewer.engine.answers.base import Answer, Source
-from naisr_viewer.engine.members import Member
+from naisr_viewer.engine.people import FittedPerson
 from naisr_viewer.engine.surfaces import at_nearest, limit_mm, volume_cm3
 from naisr_viewer.state.layouts import FULL_SHAPE
 from naisr_viewer.state.requests import EXACT_RESOLUTION, Colouring, Origin, SurfaceRequest, SurfaceResult
@@ -32,9 +32,9 @@ def _give(source: Source, request: SurfaceRequest, progress: Progress) -> Surfac
         return shape
     for each in {request.person, person} if shape.is_exact else ():
         source.prepare_previews(path, each, progress)
-    _, member, tracker = source.who(path, request.person)
+    _, fitted, tracker = source.who(path, request.person)
     earlier = source.who(path, person).tracker
-    if member is None or tracker is None or earlier is None:
+    if fitted is None or tracker is None or earlier is None:
         return shape
     first = later = source.previews.track_before(path, person, values, earlier)
     before_mm = first.points_mm
@@ -44,16 +44,16 @@ def _give(source: Source, request: SurfaceRequest, progress: Progress) -> Surfac
         before_mm = shape.points_mm + at_nearest(later.points_mm, moved_mm, shape.points_mm)
     return replace(
         shape,
-        colouring=_moved(member, before_mm, shape),
+        colouring=_moved(fitted, before_mm, shape),
         volume_before_cm3=_volume_before_cm3(source, request, first, tracker.faces, progress.quiet),
         doubtful=shape.doubtful or not (first.is_trustworthy and later.is_trustworthy),
     )
 
 
-def _moved(member: Member, before_mm: NDArray[np.float32], shape: SurfaceResult) -> Colouring:
+def _moved(fitted: FittedPerson, before_mm: NDArray[np.float32], shape: SurfaceResult) -> Colouring:
     """How far corresponding points ``[n, 3]`` have moved along the normals of the later surface."""
     moved_mm = np.sum((shape.points_mm - before_mm) * shape.normals, axis=1)
-    return Colouring(moved_mm.astype(np.float32), limit_mm(member.atlas_model, SHARE), "signed")
+    return Colouring(moved_mm.astype(np.float32), limit_mm(fitted.atlas_model, SHARE), "signed")
 
 
 def _volume_before_cm3(

@@ -8,7 +8,7 @@ import numpy as np
 
 from naisr_model.progress import Progress
 from naisr_viewer.engine.answers.base import Answer, Source
-from naisr_viewer.engine.members import Member
+from naisr_viewer.engine.people import FittedPerson
 from naisr_viewer.engine.surfaces import limit_mm
 from naisr_viewer.state.patients import Named
 from naisr_viewer.state.requests import EXACT_RESOLUTION, Colouring, Origin, SurfaceRequest, SurfaceResult
@@ -18,10 +18,10 @@ SHARE = 0.02
 
 
 def _give(source: Source, request: SurfaceRequest, _progress: Progress) -> SurfaceResult:
-    start, member = time.perf_counter(), source.who(request.atlas, request.person).member
-    assert member is not None
-    is_exact, scan = request.resolution >= EXACT_RESOLUTION, member.scan
-    colouring = _distances(member, request.values) if is_exact else None
+    start, fitted = time.perf_counter(), source.who(request.atlas, request.person).fitted
+    assert fitted is not None
+    is_exact, scan = request.resolution >= EXACT_RESOLUTION, fitted.scan
+    colouring = _distances(fitted, request.values) if is_exact else None
     return SurfaceResult(
         request=request,
         points_mm=scan.points_mm,
@@ -34,10 +34,10 @@ def _give(source: Source, request: SurfaceRequest, _progress: Progress) -> Surfa
     )
 
 
-def _distances(member: Member, values: Named) -> Colouring:
+def _distances(fitted: FittedPerson, values: Named) -> Colouring:
     """How far the scan is from the person's shape at ``values``, at its vertices; positive outside."""
-    atlas, latent = member.atlas_model, member.at(values).latent
-    found = atlas.sdf(member.scan.points_mm, dict(values), latent)
+    atlas, latent = fitted.atlas_model, fitted.at(values).latent
+    found = atlas.sdf(fitted.scan.points_mm, dict(values), latent)
     return Colouring(found.astype(np.float32), limit_mm(atlas, SHARE), "signed")
 
 

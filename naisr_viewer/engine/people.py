@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Member:
+class FittedPerson:
     """Someone an open atlas was fitted to.
 
     Attributes:
