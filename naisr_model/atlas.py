@@ -3,7 +3,7 @@
 >>> from naisr_model.shipped import shipped_atlas
 >>> atlas = Atlas.load(shipped_atlas())
 >>> boy = atlas.shape({"age": 120, "weight": 34, "sex": +1}, resolution=64)
->>> 40 < boy.volume / 1000 < 55  # cm³
+>>> bool(40 < boy.volume / 1000 < 55)  # cm³
 True
 """
 
