@@ -114,7 +114,8 @@ def _run_in(
         while pending:
             progress.check()
             done, pending = wait(pending, timeout=POLL_S, return_when=FIRST_COMPLETED)
-            for future in sorted(done, key=numbers.__getitem__):
+            # A job that failed ends the run, so what else is finished is handed out before it.
+            for future in sorted(done, key=lambda one: (one.exception() is not None, numbers[one])):
                 yield numbers[future], future.result()
             if done:
                 progress.tell(1 - len(pending) / len(jobs))

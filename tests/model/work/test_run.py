@@ -6,6 +6,7 @@ import doctest
 import math
 import os
 import time
+from concurrent import futures
 
 import pytest
 
@@ -58,6 +59,15 @@ def test_a_result_is_there_before_the_other_jobs_are_done():
 def test_a_mistake_in_a_job_is_raised_here(workers):
     with processes(workers) as work, pytest.raises(ValueError, match=r"math domain|nonnegative"):
         list(work(math.sqrt, [4.0, -1.0]))
+
+
+def test_what_is_finished_together_with_a_mistake_is_not_lost(monkeypatch):
+    monkeypatch.setattr(run, "wait", lambda pending, **_: futures.wait(pending))
+    found = []
+    with processes(2) as work, pytest.raises(ValueError, match=r"math domain|nonnegative"):
+        for result in work(math.sqrt, [-1.0, 4.0, 9.0]):
+            found.append(result)
+    assert found == [(1, 2.0), (2, 3.0)]
 
 
 @pytest.mark.parametrize("workers", [1, 2])
