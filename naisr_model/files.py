@@ -1,7 +1,8 @@
-"""Writing files so that a reader, or a power cut, never meets half of one."""
+"""Files: written so that a reader, or a power cut, never meets half of one, and known by their contents."""
 
 from __future__ import annotations
 
+import hashlib
 import os
 import secrets
 from collections.abc import Iterator
@@ -25,6 +26,12 @@ def replacing(path: Path) -> Iterator[Path]:
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def sources_digest(*folders: Path) -> bytes:
+    """SHA-256 of the Python sources in some folders: another one is another program, whatever its version."""
+    sources = [file for folder in folders for file in sorted(folder.rglob("*.py"))]
+    return hashlib.sha256(b"".join(file.read_bytes() for file in sources)).digest()
 
 
 def _flush(path: Path) -> None:

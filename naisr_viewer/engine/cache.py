@@ -25,7 +25,7 @@ from naisr_model import errors
 from naisr_model.capabilities import Capabilities
 from naisr_model.covariates import Population
 from naisr_model.errors import InputError
-from naisr_model.files import replacing
+from naisr_model.files import replacing, sources_digest
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.layouts import FULL_SHAPE, TEMPLATE
 from naisr_viewer.state.requests import EXACT_RESOLUTION, Origin, SurfaceRequest, SurfaceResult
@@ -65,8 +65,7 @@ def fingerprint_of(path: Path) -> str:
 @lru_cache(maxsize=1)
 def program_digest() -> bytes:
     """Of the code that computes surfaces."""
-    sources = sorted(file for folder in PROGRAM for file in folder.rglob("*.py"))
-    return hashlib.sha256(b"".join(file.read_bytes() for file in sources)).digest()
+    return sources_digest(*PROGRAM)
 
 
 @dataclass(frozen=True, eq=False)

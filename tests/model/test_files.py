@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from naisr_model.files import replacing
+from naisr_model.files import replacing, sources_digest
 
 
 def test_the_content_is_on_the_disk_before_it_takes_its_place(tmp_path, monkeypatch):
@@ -42,7 +42,7 @@ def test_writing_leaves_the_mask_of_the_process_alone(tmp_path, monkeypatch):
 def test_a_file_gets_the_permissions_of_any_other(tmp_path):
     program = (
         "import os, pathlib, sys; os.umask(0o027)\n"
-        "from naisr_model.files import replacing\n"
+        "from naisr_model.files import replacing, sources_digest\n"
         "with replacing(pathlib.Path(sys.argv[1])) as temporary:\n"
         "    os.close(os.open(temporary, os.O_CREAT, 0o600))\n"
         "pathlib.Path(sys.argv[2]).touch()\n"
@@ -53,3 +53,18 @@ def test_a_file_gets_the_permissions_of_any_other(tmp_path):
     )
     assert saved.stat().st_mode == plain.stat().st_mode
     assert plain.stat().st_mode & 0o777 == 0o640
+
+
+def test_sources_are_known_by_what_they_say_and_not_by_where_they_are(tmp_path):
+    def program(name: str, **sources: str) -> Path:
+        for source, text in sources.items():
+            file = tmp_path / name / "inner" / f"{source}.py"
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(text)
+        return tmp_path / name
+
+    first = sources_digest(program("a", one="x = 1", two="y = 2"))
+    assert first == sources_digest(program("moved", one="x = 1", two="y = 2"))
+    assert first != sources_digest(program("b", one="x = 1", two="y = 3"))
+    assert first != sources_digest(program("c", one="x = 1"))
+    assert first != sources_digest(program("a"), program("b"))
