@@ -1,7 +1,8 @@
 """What an evaluation has measured so far, one line of JSON a case, so that a run that was killed goes on.
 
 The first line says of what the journal is; every other one is a case. A line counts once it is complete, so
-the half of one that a killed run leaves is forgotten, and its case is measured again.
+the half of one that a killed run leaves is forgotten, and its case is measured again. One run keeps a journal
+at a time: it holds the file of the same name with ``.lock`` behind it, which a killed run lets go of.
 """
 
 from __future__ import annotations
@@ -13,6 +14,8 @@ from contextlib import contextmanager
 from io import BufferedWriter
 from pathlib import Path
 from typing import Any
+
+from filelock import FileLock, Timeout
 
 from naisr_model.errors import InputError
 
@@ -44,20 +47,37 @@ def read(path: Path, identity: Record) -> dict[str, Record]:
 
 
 @contextmanager
-def keeping(path: Path, identity: Record) -> Iterator[Keep]:
-    """Hands out what adds a record under a key, after those that :func:`read` gives.
+def keeping(path: Path, identity: Record) -> Iterator[tuple[dict[str, Record], Keep]]:
+    """Hands out what :func:`read` gives, and what adds a record under a key; nobody else can meanwhile.
 
     Args:
         path: the journal; made where there is none.
         identity: of what it is: its first line.
+
+    Raises:
+        InputError: when it is of something else, no journal, or kept by another run.
     """
-    whole = _complete_lines(path, identity)
     path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("ab") as file:
-        file.truncate(sum(map(len, whole)))
-        if not whole:
-            _add(file, identity)
-        yield lambda key, record: _add(file, {"key": key, "record": record})
+    with _alone(path):
+        records, whole = read(path, identity), _complete_lines(path, identity)
+        with path.open("ab") as file:
+            file.truncate(sum(map(len, whole)))
+            if not whole:
+                _add(file, identity)
+            yield records, lambda key, record: _add(file, {"key": key, "record": record})
+
+
+@contextmanager
+def _alone(path: Path) -> Iterator[None]:
+    lock = FileLock(path.with_name(path.name + ".lock"))
+    try:
+        held = lock.acquire(blocking=False)
+    except Timeout as error:
+        raise InputError(
+            f"another run keeps {path}; wait until it has ended, or name another journal"
+        ) from error
+    with held:
+        yield
 
 
 def _add(file: BufferedWriter, value: Record) -> None:

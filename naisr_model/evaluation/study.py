@@ -2,7 +2,8 @@
 
 A study is one file in ``studies`` and one line in its registry: a frozen dataclass, small enough to be sent
 to other processes, whose fields are its options, documented under ``Attributes``. :func:`run` does the rest:
-it keeps what is measured in a journal and spreads the cases over processes.
+it keeps what is measured in a journal, spreads the cases over processes, and sees to it that all of them are
+of the same files.
 """
 
 from __future__ import annotations
@@ -11,15 +12,15 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import fields
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, TypeVar
 
-from naisr_model import __version__
 from naisr_model.data.store import INDEX
 from naisr_model.errors import InputError
 from naisr_model.evaluation import journal as journals
 from naisr_model.evaluation.journal import Keep, Record, plain
+from naisr_model.files import sources_digest
 from naisr_model.progress import SILENT, Progress
 from naisr_model.work.run import processes
 
@@ -75,46 +76,66 @@ def run(
         progress: told the finished share.
 
     Raises:
-        InputError: when there is nothing to measure, or the journal is of something else.
+        InputError: when there is nothing to measure, the journal is of something else or kept by another run,
+            or the atlas or the store was changed meanwhile.
         Cancelled: when nobody waits any more.
     """
+    started = identity(study)
     cases = study.cases()
+    _require_unchanged(study, started)
     if not cases:
         raise InputError("there is nothing to measure with these options; ask for more")
     if len({case.key for case in cases}) < len(cases):
         raise ValueError(f"two cases of {study} have the same key")
-    named = None if journal is None else (journal, identity(study))
-    records = {} if named is None else journals.read(*named)
-    missing = [case for case in cases if case.key not in records]
-    left = progress.part(1 - len(missing) / len(cases), 1.0)
-    # Whether anybody waits cannot be asked from other processes: there a case is given up with its process.
-    measure = partial(study.measure, progress=left.quiet) if workers == 1 else study.measure
-    with processes(workers) as work, _keeping(named) as keep:
+    with processes(workers) as work, _keeping(journal, started) as (kept, keep):
+        missing = [case for case in cases if case.key not in kept]
+        left = progress.part(1 - len(missing) / len(cases), 1.0)
+        # Whether anybody waits cannot be asked from other processes: there a case goes with its process.
+        measure = partial(study.measure, progress=left.quiet) if workers == 1 else study.measure
+        records = dict(kept)
         for number, record in work(measure, missing, left):
+            _require_unchanged(study, started)
             records[missing[number].key] = plain(record)
             keep(missing[number].key, record)
     return study.summarise([records[case.key] for case in cases])
 
 
 def identity(study: Study[Any]) -> Record:
-    """What makes two runs the same: the program's version, the study, and its options.
+    """What makes two runs the same: the program, the study, and its options.
 
-    Files stand for themselves by their contents, so that they may move.
+    The program and files stand for themselves by their contents, so that they may move.
     """
     options = {field.name: _contents(getattr(study, field.name)) for field in fields(study)}
-    return plain({"version": __version__, "study": type(study).__name__, **options})
+    return plain({"program": _program(), "study": type(study).__name__, **options})
+
+
+@lru_cache(maxsize=1)
+def _program() -> str:
+    """Digest of the code that measures."""
+    return sources_digest(Path(__file__).parents[1]).hex()
+
+
+def _require_unchanged(study: Study[Any], started: Record) -> None:
+    """Make sure that the files of a study are still those of its start; a training rewrites its own often."""
+    if changed := [name for name, value in identity(study).items() if value != started[name]]:
+        raise InputError(
+            f"the {changed[0]} {getattr(study, changed[0])} was changed while it was evaluated; "
+            "give a copy, or wait until nobody writes to it, and run again"
+        )
 
 
 def _contents(value: Any) -> Any:
-    """The value of an option; of a file its fingerprint, of a store that of its index."""
+    """The value of an option; of a file or a store's index its fingerprint, None where it is missing."""
     if not isinstance(value, Path):
         return value
     file = value / INDEX if value.is_dir() else value
-    return hashlib.sha256(file.read_bytes()).hexdigest()
+    return hashlib.sha256(file.read_bytes()).hexdigest() if file.exists() else None
 
 
-def _keeping(named: tuple[Path, Record] | None) -> AbstractContextManager[Keep]:
-    return nullcontext(_forget) if named is None else journals.keeping(*named)
+def _keeping(
+    journal: Path | None, started: Record
+) -> AbstractContextManager[tuple[Mapping[str, Record], Keep]]:
+    return nullcontext(({}, _forget)) if journal is None else journals.keeping(journal, started)
 
 
 def _forget(_key: str, _record: Record) -> None: ...

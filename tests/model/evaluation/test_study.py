@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -15,9 +16,11 @@ from typing import Any
 
 import pytest
 
+from naisr_model.data.store import INDEX
 from naisr_model.errors import Cancelled, InputError
 from naisr_model.evaluation.studies.completion import Completion
 from naisr_model.evaluation.study import identity, run
+from naisr_model.files import sources_digest
 from naisr_model.progress import SILENT, Progress
 
 ROOT = Path(__file__).parents[3]
@@ -98,6 +101,65 @@ def test_a_journal_is_of_one_study_with_one_atlas_and_its_options(squares, tmp_p
     moved.write_text("another atlas")
     with pytest.raises(InputError, match="an evaluation with another atlas; name another journal"):
         run(replace(squares, atlas=moved), journal=journal)
+
+
+@dataclass(frozen=True)
+class Rewritten(Squares):
+    """A study whose file a training rewrites while the second case is measured."""
+
+    def measure(self, case: Number, progress: Progress = SILENT) -> dict[str, Any]:
+        if case.value == self.numbers - 2:
+            self.atlas.write_text("trained on")
+        return super().measure(case, progress)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("is_kept", [True, False])
+def test_files_that_change_meanwhile_end_it(squares, tmp_path, workers, is_kept):
+    journal = tmp_path / "journal.jsonl" if is_kept else None
+    study = Rewritten(squares.atlas, squares.log)
+    with pytest.raises(
+        InputError, match=r"the atlas .*atlas was changed while it was evaluated; give a copy"
+    ):
+        run(study, workers=workers, journal=journal)
+    if journal is not None:
+        kept = [json.loads(line)["key"] for line in journal.read_text().splitlines()[1:]]
+        assert set(kept) <= {"number 3"}
+
+
+def test_a_file_that_changes_between_the_start_and_the_cases_ends_it(squares):
+    class Sooner(Squares):
+        def cases(self) -> list[Number]:
+            self.atlas.unlink()
+            return super().cases()
+
+    with pytest.raises(InputError, match=r"the atlas .* was changed"):
+        run(Sooner(squares.atlas, squares.log))
+
+
+def test_the_store_counts_as_well(egg_atlas, egg_store, tmp_path, monkeypatch):
+    store = Path(shutil.copytree(egg_store.path, tmp_path / "store"))
+    measure = Completion.measure
+
+    def while_somebody_prepares(*arguments: Any) -> dict[str, Any]:
+        found = measure(*arguments)
+        (store / INDEX).write_text((store / INDEX).read_text() + " ")
+        return found
+
+    monkeypatch.setattr(Completion, "measure", lambda *some, progress: while_somebody_prepares(*some))
+    with pytest.raises(InputError, match=r"the store .*store was changed while it was evaluated"):
+        run(Completion(egg_atlas, store=store, limit=1))
+
+
+def test_a_journal_is_of_one_program(squares, tmp_path):
+    assert identity(squares)["program"] == sources_digest(ROOT / "naisr_model").hex()
+    journal = tmp_path / "journal.jsonl"
+    run(squares, journal=journal)
+    first, *cases = journal.read_text().splitlines()
+    other = json.dumps(json.loads(first) | {"program": "of yesterday"})
+    journal.write_text("\n".join([other, *cases]) + "\n")
+    with pytest.raises(InputError, match="an evaluation with another program; name another journal"):
+        run(squares, journal=journal)
 
 
 def test_nothing_to_measure_is_said(squares):
