@@ -9,7 +9,10 @@ mean squared distance to the nearest is about A / (pi n).
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import igl
 import numpy as np
@@ -31,31 +34,6 @@ Points = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Distances:
-    """What separates a shape from its target.
-
-    Attributes:
-        cd_x100: Chamfer distance, :func:`chamfer` of the scaled shapes, times 100.
-        hd_x100: Hausdorff distance, :func:`hausdorff` of the scaled shapes, times 100.
-        hd95_x100: the same with 95th percentiles instead of maxima.
-        emd_x100: earth mover's distance, :func:`earth_movers` of the scaled shapes, times 100.
-        mean_mm: symmetric mean surface distance, :func:`mean_distance`, in millimetres, not scaled.
-        vd_cm3: absolute difference of the enclosed volumes in cubic centimetres.
-        samples: surface samples of each shape behind all but the EMD and the volume.
-        emd_samples: surface samples of each shape behind the EMD.
-    """
-
-    cd_x100: float
-    hd_x100: float
-    hd95_x100: float
-    emd_x100: float
-    mean_mm: float
-    vd_cm3: float
-    samples: int
-    emd_samples: int
-
-
-@dataclass(frozen=True)
 class Nearest:
     """Nearest-neighbour distances between two point sets, both ways.
 
@@ -68,6 +46,105 @@ class Nearest:
     back: Points
 
 
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """A shape and its target as the metrics see them; what several of them need is computed once.
+
+    Attributes:
+        target: the true shape, millimetres.
+        shape: the shape that is judged, millimetres.
+        samples: surface samples of each for the nearest-neighbour distances.
+        emd_samples: surface samples of each for the EMD.
+        seed: of the samples.
+    """
+
+    target: trimesh.Trimesh
+    shape: trimesh.Trimesh
+    samples: int = SAMPLES
+    emd_samples: int = EMD_SAMPLES
+    seed: int = 0
+
+    @cached_property
+    def scale_mm(self) -> float:
+        """What both are divided by, :func:`unit_scale` of the target."""
+        return unit_scale(self.target)
+
+    @cached_property
+    def points(self) -> tuple[Points, Points]:
+        """Independent samples of the two surfaces, ``[n, 3]`` each, enough for every metric."""
+        one, other = np.random.SeedSequence(self.seed).spawn(2)
+        count = max(self.samples, self.emd_samples)
+        return _sample(self.target, count, one), _sample(self.shape, count, other)
+
+    @cached_property
+    def nearest(self) -> Nearest:
+        """Nearest-neighbour distances in millimetres of the first ``samples`` points, both ways."""
+        here, there = self.points
+        return nearest_distances(here[: self.samples], there[: self.samples])
+
+    @property
+    def few_points(self) -> tuple[Points, Points]:
+        """The first ``emd_samples`` points of each."""
+        here, there = self.points
+        return here[: self.emd_samples], there[: self.emd_samples]
+
+
+HUNDREDTHS = "x10²"
+"""Unit of what is scaled: hundredths of the target's largest distance from its centre."""
+
+
+@dataclass(frozen=True)
+class Metric:
+    """One way to say how far a shape is from its target; everything that tells of it is made from this.
+
+    Attributes:
+        key: its name in records.
+        title: its name in tables.
+        unit: of its values.
+        definition: in words, for whoever reads a report.
+        measure: its value for a pair of shapes.
+    """
+
+    key: str
+    title: str
+    unit: str
+    definition: str
+    measure: Callable[[Pair], float]
+
+    @property
+    def column(self) -> str:
+        """Title and unit, as a table's header has them."""
+        return f"{self.title} {self.unit}" if self.unit == HUNDREDTHS else f"{self.title}, {self.unit}"
+
+
+@dataclass(frozen=True)
+class Distances:
+    """What separates a shape from its target.
+
+    Attributes:
+        values: by the keys of :data:`METRICS`, in their order.
+        samples: surface samples of each shape behind all but the EMD and the volume.
+        emd_samples: surface samples of each shape behind the EMD.
+    """
+
+    values: Mapping[str, float]
+    samples: int
+    emd_samples: int
+
+    def __getitem__(self, key: str) -> float:
+        return self.values[key]
+
+    def to_json(self) -> dict[str, Any]:
+        """One flat record."""
+        return {**self.values, "samples": self.samples, "emd_samples": self.emd_samples}
+
+    @classmethod
+    def from_json(cls, record: Mapping[str, Any]) -> Distances:
+        """Of what :meth:`to_json` gave."""
+        values = {metric.key: record[metric.key] for metric in METRICS}
+        return cls(values, record["samples"], record["emd_samples"])
+
+
 def compare(
     target: trimesh.Trimesh,
     shape: trimesh.Trimesh,
@@ -76,7 +153,7 @@ def compare(
     emd_samples: int = EMD_SAMPLES,
     seed: int = 0,
 ) -> Distances:
-    """All distances of ``shape`` from ``target``, both in millimetres.
+    """All :data:`METRICS` of ``shape`` against ``target``, both in millimetres.
 
     Args:
         target: the true shape; it sets the scale.
@@ -88,19 +165,8 @@ def compare(
     Raises:
         InputError: when either has no faces.
     """
-    scale_mm = unit_scale(target)
-    here, there = _sample_pair(target, shape, max(samples, emd_samples), seed)
-    nearest = nearest_distances(here[:samples], there[:samples])
-    return Distances(
-        cd_x100=100 * chamfer(nearest) / scale_mm**2,
-        hd_x100=100 * hausdorff(nearest) / scale_mm,
-        hd95_x100=100 * hausdorff(nearest, percentile=95) / scale_mm,
-        emd_x100=100 * earth_movers(here[:emd_samples], there[:emd_samples]) / scale_mm,
-        mean_mm=mean_distance(nearest),
-        vd_cm3=volume_difference_cm3(target, shape),
-        samples=samples,
-        emd_samples=emd_samples,
-    )
+    pair = Pair(target, shape, samples, emd_samples, seed)
+    return Distances({metric.key: metric.measure(pair) for metric in METRICS}, samples, emd_samples)
 
 
 def unit_scale(target: trimesh.Trimesh) -> float:
@@ -145,25 +211,9 @@ def volume_difference_cm3(target: trimesh.Trimesh, shape: trimesh.Trimesh) -> fl
     return abs(float(shape.volume) - float(target.volume)) / 1000
 
 
-def hausdorff_x100(
-    target: trimesh.Trimesh, shape: trimesh.Trimesh, *, samples: int = SAMPLES, seed: int = 0
-) -> float:
-    """The Hausdorff distance of :func:`compare` alone."""
-    nearest = nearest_distances(*_sample_pair(target, shape, samples, seed))
-    return 100 * hausdorff(nearest) / unit_scale(target)
-
-
 def component_count(mesh: trimesh.Trimesh) -> int:
     """Pieces of the surface that share no edge: 1 for a sound shape, 0 where there is no surface."""
     return int(igl.facet_components(np.asarray(mesh.faces))[0]) if len(mesh.faces) else 0
-
-
-def _sample_pair(
-    first: trimesh.Trimesh, second: trimesh.Trimesh, count: int, seed: int
-) -> tuple[Points, Points]:
-    """Independent samples of two surfaces, ``[count, 3]`` each."""
-    one, other = np.random.SeedSequence(seed).spawn(2)
-    return _sample(first, count, one), _sample(second, count, other)
 
 
 def _sample(mesh: trimesh.Trimesh, count: int, seed: np.random.SeedSequence) -> Points:
@@ -174,3 +224,51 @@ def _sample(mesh: trimesh.Trimesh, count: int, seed: np.random.SeedSequence) -> 
 def _require_surface(mesh: trimesh.Trimesh) -> None:
     if not len(mesh.faces):
         raise InputError("one of the shapes to compare has no surface; check it before asking for a distance")
+
+
+CHAMFER = Metric(
+    "cd_x100",
+    "CD",
+    HUNDREDTHS,
+    "Chamfer distance: sum of the two mean squared nearest-neighbour distances, x 100",
+    lambda pair: 100 * chamfer(pair.nearest) / pair.scale_mm**2,
+)
+HAUSDORFF = Metric(
+    "hd_x100",
+    "HD",
+    HUNDREDTHS,
+    "Hausdorff distance: the larger of the two one-sided maxima, x 100",
+    lambda pair: 100 * hausdorff(pair.nearest) / pair.scale_mm,
+)
+HAUSDORFF_95 = Metric(
+    "hd95_x100",
+    "HD95",
+    HUNDREDTHS,
+    "as HD with the one-sided 95th percentiles, x 100",
+    lambda pair: 100 * hausdorff(pair.nearest, percentile=95) / pair.scale_mm,
+)
+EARTH_MOVERS = Metric(
+    "emd_x100",
+    "EMD",
+    HUNDREDTHS,
+    "earth mover's distance: mean ground distance of the exact one-to-one assignment, x 100; "
+    "random samples of one and the same surface are not at 0",
+    lambda pair: 100 * earth_movers(*pair.few_points) / pair.scale_mm,
+)
+MEAN_DISTANCE = Metric(
+    "mean_mm",
+    "mean distance",
+    "mm",
+    "mean of the two one-sided mean nearest-neighbour distances, in mm, not scaled",
+    lambda pair: mean_distance(pair.nearest),
+)
+VOLUME_DIFFERENCE = Metric(
+    "vd_cm3",
+    "VD",
+    "cm³",
+    "absolute volume difference in cm³",
+    lambda pair: volume_difference_cm3(pair.target, pair.shape),
+)
+
+METRICS = (CHAMFER, HAUSDORFF, HAUSDORFF_95, EARTH_MOVERS, MEAN_DISTANCE, VOLUME_DIFFERENCE)
+"""All that reports tell, in the order of their columns."""

@@ -8,35 +8,20 @@ from typing import Any
 import numpy as np
 
 from naisr_model.evaluation.journal import Record
-from naisr_model.evaluation.metrics import Distances
+from naisr_model.evaluation.metrics import METRICS, Distances
 from naisr_model.evaluation.published import Published
 
-DEFINITIONS = {
-    "cd_x100": "Chamfer distance: sum of the two mean squared nearest-neighbour distances, x 100",
-    "hd_x100": "Hausdorff distance: the larger of the two one-sided maxima, x 100",
-    "hd95_x100": "as HD with the one-sided 95th percentiles, x 100",
-    "emd_x100": "earth mover's distance: mean ground distance of the exact one-to-one assignment, x 100; "
-    "random samples of one and the same surface are not at 0",
-    "mean_mm": "mean of the two one-sided mean nearest-neighbour distances, in mm, not scaled",
-    "vd_cm3": "absolute volume difference in cm³",
-}
+DEFINITIONS = {metric.key: metric.definition for metric in METRICS}
 """What each measured column of the record means; ``scale`` below applies to the ``_x100`` ones."""
 
 SCALE = "both shapes divided by the target's largest distance from its centre"
 
-COLUMNS = {
-    "cd_x100": "CD x10²",
-    "hd_x100": "HD x10²",
-    "hd95_x100": "HD95 x10²",
-    "emd_x100": "EMD x10²",
-    "mean_mm": "mean distance, mm",
-    "vd_cm3": "VD, cm³",
-}
+COLUMNS = {metric.key: metric.column for metric in METRICS}
 
 
 def summary(distances: Sequence[Distances]) -> Record:
     """How many there are, ``n``, and the mean and the median of each column."""
-    columns = {name: mean_and_median([getattr(item, name) for item in distances]) for name in COLUMNS}
+    columns = {name: mean_and_median([item[name] for item in distances]) for name in COLUMNS}
     return {"n": len(distances), **columns}
 
 

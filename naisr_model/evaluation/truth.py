@@ -10,7 +10,7 @@ import numpy as np
 from naisr_model.atlas import Atlas
 from naisr_model.covariates import Covariate, Population
 from naisr_model.evaluation.held_out import aligned, known_population, synthetic
-from naisr_model.evaluation.metrics import hausdorff_x100
+from naisr_model.evaluation.metrics import HAUSDORFF, Pair
 from naisr_model.progress import SILENT, Progress
 
 NEIGHBOURS, NEIGHBOUR_DISTANCE = 3, 0.25
@@ -43,7 +43,7 @@ class TruthPoint:
         condition: what else defines the place, for example ``boys``; empty where nothing does.
         volume_cm3: volume of the atlas's shape at z = 0.
         truth_cm3: volume of the true shape without individual variation.
-        hd_x100: Hausdorff distance from the true shape, see :class:`~.metrics.Distances`.
+        hd_x100: Hausdorff distance from the true shape, see :data:`~.metrics.HAUSDORFF`.
     """
 
     covariate: str
@@ -95,7 +95,7 @@ def beside_truth(atlas: Atlas, place: Place, resolution: int, progress: Progress
         condition=place.condition,
         volume_cm3=float(shape.volume / 1000),
         truth_cm3=float(truth.volume / 1000),
-        hd_x100=hausdorff_x100(truth, shape) if len(shape.faces) else float("inf"),
+        hd_x100=HAUSDORFF.measure(Pair(truth, shape)) if len(shape.faces) else float("inf"),
     )
 
 

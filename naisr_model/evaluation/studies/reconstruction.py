@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import KW_ONLY, asdict, dataclass
+from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -203,11 +203,11 @@ def refitted(atlas: Atlas, shape: HeldOut, known: Values, progress: Progress = S
     values = {**fit.covariates, **known}
     surface = atlas.shape(values, fit.latent, RESOLUTION, extrapolate=True, progress=progress.quiet)
     found = compare(shape.mesh_mm, surface) if len(surface.faces) else None
-    return {"distances": found and asdict(found), "components": component_count(surface)}
+    return {"distances": found and found.to_json(), "components": component_count(surface)}
 
 
 def _distances(records: Iterable[Record]) -> list[Distances]:
-    return [Distances(**record["distances"]) for record in records if record["distances"]]
+    return [Distances.from_json(record["distances"]) for record in records if record["distances"]]
 
 
 def _extremes(records: Sequence[Record]) -> list[int]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import KW_ONLY, asdict, dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -238,7 +238,7 @@ def _measured(
     return {
         "volume_cm3": float(surface_mm.volume) / 1000,
         "interval_cm3": interval_cm3 and list(interval_cm3),
-        "distances": distances and asdict(distances),
+        "distances": distances and distances.to_json(),
     }
 
 
@@ -257,7 +257,7 @@ def _record(cases: Sequence[Record]) -> Record:
 
 
 def _distances(predictions: Sequence[Record]) -> list[Distances]:
-    return [Distances(**one["distances"]) for one in predictions if one["distances"]]
+    return [Distances.from_json(one["distances"]) for one in predictions if one["distances"]]
 
 
 def _volumes(case: Record) -> Record:

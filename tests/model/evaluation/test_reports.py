@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
+import subprocess
+import sys
 
 import pytest
 
@@ -19,8 +20,13 @@ from naisr_model.evaluation.reports import (
     summary,
 )
 
-FIRST = Distances(0.01, 2.0, 1.0, 3.0, 0.5, 0.1, samples=30_000, emd_samples=2048)
-OTHERS = [dataclasses.replace(FIRST, cd_x100=cd, hd_x100=hd) for cd, hd in [(0.02, 3.0), (0.06, 10.0)]]
+
+def distances(cd_x100: float, hd_x100: float) -> Distances:
+    others = {"hd95_x100": 1.0, "emd_x100": 3.0, "mean_mm": 0.5, "vd_cm3": 0.1}
+    return Distances({"cd_x100": cd_x100, "hd_x100": hd_x100, **others}, samples=30_000, emd_samples=2048)
+
+
+FIRST, *OTHERS = (distances(cd, hd) for cd, hd in [(0.01, 2.0), (0.02, 3.0), (0.06, 10.0)])
 
 
 def test_mean_and_median_of_every_distance() -> None:
@@ -32,9 +38,35 @@ def test_mean_and_median_of_every_distance() -> None:
     assert distance_cells(found)[:2] == ["0.03 / 0.02", "5 / 3"]
 
 
-def test_every_distance_is_a_field_of_the_measurement() -> None:
-    fields = {field.name for field in dataclasses.fields(Distances)}
-    assert set(COLUMNS) == set(DEFINITIONS) == fields - {"samples", "emd_samples"}
+def test_columns_are_those_of_the_published_tables_and_our_own() -> None:
+    assert COLUMNS == {
+        "cd_x100": "CD x10²",
+        "hd_x100": "HD x10²",
+        "hd95_x100": "HD95 x10²",
+        "emd_x100": "EMD x10²",
+        "mean_mm": "mean distance, mm",
+        "vd_cm3": "VD, cm³",
+    }
+    assert list(DEFINITIONS) == list(COLUMNS) and all(DEFINITIONS.values())
+
+
+def test_a_metric_is_one_value_from_its_measurement_to_its_column() -> None:
+    """In a program of its own, where the registry has one more."""
+    program = """
+from naisr_model.evaluation import metrics
+area = metrics.Metric("area_cm2", "area", "cm²", "difference of the areas",
+                      lambda pair: abs(pair.shape.area - pair.target.area) / 100)
+metrics.METRICS += (area,)
+import trimesh
+from naisr_model.evaluation.reports import COLUMNS, definitions, distance_cells
+from naisr_model.evaluation.reports import markdown_table, meaning, summary
+box, cube = (trimesh.creation.box(extents=(10, 10, side)) for side in (20, 10))
+found = metrics.compare(box, cube, samples=50, emd_samples=10)
+print(markdown_table(COLUMNS.values(), [distance_cells(summary([found]))]), definitions(meaning(found)))
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert "VD, cm³ | area, cm² |" in done.stdout and "| 4 / 4 |" in done.stdout
+    assert "- area, cm²: difference of the areas." in done.stdout
 
 
 def test_columns_are_defined_below_the_table() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 from functools import partial
 
@@ -19,8 +18,13 @@ from naisr_model.evaluation.study import run
 from naisr_model.evaluation.truth import TruthPoint
 from naisr_model.shipped import shipped_atlas
 
-FIRST = Distances(0.01, 2.0, 1.0, 3.0, 0.5, 0.1, samples=30_000, emd_samples=2048)
-OTHERS = [dataclasses.replace(FIRST, cd_x100=cd, hd_x100=hd) for cd, hd in [(0.02, 3.0), (0.06, 10.0)]]
+
+def distances(cd_x100: float, hd_x100: float) -> Distances:
+    others = {"hd95_x100": 1.0, "emd_x100": 3.0, "mean_mm": 0.5, "vd_cm3": 0.1}
+    return Distances({"cd_x100": cd_x100, "hd_x100": hd_x100, **others}, samples=30_000, emd_samples=2048)
+
+
+FIRST, *OTHERS = (distances(cd, hd) for cd, hd in [(0.01, 2.0), (0.02, 3.0), (0.06, 10.0)])
 GROWTH = [
     TruthPoint("age", 6, "girls", volume_cm3=2.1, truth_cm3=2.0, hd_x100=1.5),
     TruthPoint("age", 6, "boys", volume_cm3=1.8, truth_cm3=2.0, hd_x100=1.6),
@@ -34,8 +38,8 @@ EFFECTS = [
 AIRWAY = Reconstruction(shipped_atlas())
 
 
-def refits(part: str, distances: list[Distances | None]) -> list[dict]:
-    measured = [one and dataclasses.asdict(one) for one in distances]
+def refits(part: str, found: list[Distances | None]) -> list[dict]:
+    measured = [one and one.to_json() for one in found]
     return [{"part": part, "distances": one, "components": 1 if one else 0} for one in measured]
 
 
