@@ -74,6 +74,9 @@ UNTOLD_SHARE = 0.5
 class Atlas:
     """A trained atlas, answering in real units.
 
+    It is the one door to every question that viewer, commands and notebooks may ask, hence its length; the
+    answers are found in the rooms below.
+
     Everywhere, ``covariates`` maps names to values in real units (``{"age": 120}`` in the unit of
     ``atlas.covariates``; a binary covariate is -1 or +1, or between them); what is left out is at
     the population centre. ``latent`` is a code z ``[L]``; left out, it is 0, the population
@@ -598,16 +601,17 @@ class Fit:
         visit to another is kept of it, see :meth:`Individual.elsewhere`.
 
         Raises:
-            InputError: for an unknown covariate or one out of range (unless ``extrapolate``), and where the
-                model is not transferable.
+            InputError: for an unknown covariate or one out of range (unless ``extrapolate``), and for others
+                than those of the fit where the model is not transferable.
         """
         atlas = self.individual.atlas
-        if values and not atlas.capabilities.transferable:
+        known = atlas.complete({**self.covariates, **values}, extrapolate=extrapolate)
+        vector = normalised_vector(atlas.covariates, known)
+        if nearness(self.individual.posterior, vector) < 1 and not atlas.capabilities.transferable:
             raise InputError(
                 f"{atlas.model_title} does not carry shapes to other covariates; ask for the fitted shape"
             )
-        known = atlas.complete({**self.covariates, **values}, extrapolate=extrapolate)
-        return self.individual.elsewhere(normalised_vector(atlas.covariates, known))
+        return self.individual.elsewhere(vector)
 
     def _real(self, vector: NDArray[np.float64]) -> dict[str, float]:
         pairs = zip(self.individual.atlas.covariates, vector, strict=True)

@@ -10,6 +10,7 @@ from eggs import egg
 
 from naisr_model.covariates import growth_path
 from naisr_model.errors import Cancelled, InputError
+from naisr_model.models.factory import model_class
 from naisr_model.progress import Progress
 
 
@@ -102,6 +103,19 @@ def test_the_person_at_other_covariates(atlas, made):
     assert deviations.shape == (len(surface.vertices),) and (deviations > 0).all()
     with pytest.raises(InputError, match="99 years"):
         fit.at({"age": 99})
+
+
+def test_a_model_that_carries_no_shape_elsewhere_shows_the_fit_itself(atlas, made, monkeypatch):
+    values, _, shape = made
+    fit = atlas.fit(shape, values)
+    own = dataclasses.replace(atlas.capabilities, transferable=False)
+    monkeypatch.setattr(model_class(atlas.checkpoint.preset.model), "capabilities", own)
+    rounded = {name: value + 1e-9 for name, value in fit.covariates.items()}
+    for asked in ({}, values, fit.covariates, rounded):
+        assert np.array_equal(fit.at(asked).latent, fit.latent)
+    for asked in ({"age": 6.6}, {"age": 6.5, "sex": -1.0}):
+        with pytest.raises(InputError, match="does not carry shapes to other covariates; ask for the fitted"):
+            fit.at(asked)
 
 
 def test_on_another_day_a_person_is_nearer_the_average_and_less_sure(atlas, made):
