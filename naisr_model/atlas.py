@@ -46,6 +46,7 @@ from naisr_model.learning.fitting.target import draw_sample, target_of
 from naisr_model.models.base import ShapeModel, additive, deformable
 from naisr_model.models.devices import usable_device
 from naisr_model.progress import SILENT, Progress
+from naisr_model.surface.blending import blended
 from naisr_model.surface.displacements import Displacements, DisplacementTables, tabulate
 from naisr_model.surface.fields import distances, effect_field, shape_field, template_field
 from naisr_model.surface.isosurface import isosurface
@@ -57,6 +58,10 @@ from naisr_model.surface.volume import enclosed_volume
 VOLUME_RESOLUTION = 128
 CHECK_SAMPLE = 2000
 """Seed of the points at which a fit's residual is measured; the fit itself draws others."""
+
+PROBED = 1500
+"""Points at which the uncertainty of a surface is computed: it is smooth where the fit is good, so that what
+is blended of them for the others is within a tenth of its value."""
 
 TAIL = 0.025
 """Probability of lying below, and above, an interval."""
@@ -485,6 +490,18 @@ class Individual:
         points = self.atlas.frame.to_model(points_mm).astype(np.float32)
         deviations = surface_deviations(self.posterior, points, self.vector, self.latent)
         return deviations * self.atlas.frame.scale_mm
+
+    def surface_margin_mm(self, points_mm: ArrayLike) -> NDArray[np.float64]:
+        """Half of the 95 % interval of the surface's place along its normal at many points on it, ``[n]``.
+
+        It is :meth:`surface_sd_mm` at about :data:`PROBED` of them, and between these blended.
+
+        Args:
+            points_mm: ``[n, 3]``, spread over the surface.
+        """
+        points = np.asarray(points_mm)
+        probed = points[:: max(1, len(points) // PROBED)]
+        return TWO_SIDED_95 * blended(probed, self.surface_sd_mm(probed), points)
 
     @cached_property
     def surface(self) -> trimesh.Trimesh:

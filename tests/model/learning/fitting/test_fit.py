@@ -105,6 +105,17 @@ def test_the_person_at_other_covariates(atlas, made):
         fit.at({"age": 99})
 
 
+def test_the_margin_of_a_surface_is_that_of_every_point(atlas, made):
+    person = atlas.fit(made[2], made[0]).individual
+    points_mm = person.shape(96).vertices
+    assert len(points_mm) > 2 * 1500
+    everywhere = 1.959964 * person.surface_sd_mm(points_mm)
+    margin_mm = person.surface_margin_mm(points_mm)
+    assert np.abs(margin_mm / everywhere - 1).max() < 0.1
+    few = points_mm[:3]
+    assert person.surface_margin_mm(few) == pytest.approx(1.959964 * person.surface_sd_mm(few), rel=1e-3)
+
+
 def test_a_model_that_carries_no_shape_elsewhere_shows_the_fit_itself(atlas, made, monkeypatch):
     values, _, shape = made
     fit = atlas.fit(shape, values)
