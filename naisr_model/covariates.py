@@ -7,7 +7,7 @@ centred number ``c_i`` of the paper, where 0 is the population centre.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -229,6 +229,18 @@ class Population:
         )
 
 
+def require_known(names: Iterable[str], covariates: Iterable[Covariate]) -> None:
+    """Make sure that ``names`` are those of covariates of an atlas.
+
+    Raises:
+        InputError: for another name.
+    """
+    known = [covariate.name for covariate in covariates]
+    if unknown := [name for name in names if name not in known]:
+        there = f"this atlas has {', '.join(known)}" if known else "its shapes depend on no covariates"
+        raise InputError(f"unknown covariate '{unknown[0]}'; {there}")
+
+
 def complete(
     covariates: tuple[Covariate, ...], values: Values, *, extrapolate: bool = False
 ) -> dict[str, float]:
@@ -238,11 +250,7 @@ def complete(
         InputError: for an unknown name, a value that is not finite, or (unless ``extrapolate``)
             one outside the observed range.
     """
-    known = {covariate.name for covariate in covariates}
-    if unknown := sorted(set(values) - known):
-        raise InputError(
-            f"unknown covariate '{unknown[0]}'; this atlas has {', '.join(sorted(known)) or 'none'}"
-        )
+    require_known(values, covariates)
     for covariate in covariates:
         value = values.get(covariate.name, covariate.centre)
         low, high = covariate.range

@@ -11,12 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from naisr_model.atlas import Atlas, Fit, Individual
-from naisr_model.covariates import complete, growth_path
+from naisr_model.covariates import complete, growth_path, require_known
 from naisr_model.errors import InputError
 
 
 def fit_record(fit: Fit) -> dict[str, Any]:
-    """What is told of a fit, for JSON: real units, mm and cm³."""
+    """What is told of a fit, for JSON: real units, mm and cm³.
+
+    ``lasting`` is None where the model shows nobody on another day.
+    """
+    can = fit.individual.atlas.capabilities
     return {
         "covariates": fit.covariates,
         "inferred": list(fit.inferred),
@@ -24,7 +28,7 @@ def fit_record(fit: Fit) -> dict[str, Any]:
         "alternatives": [dataclasses.asdict(one) for one in fit.alternatives],
         "remarks": list(fit.remarks),
         "residual_mm": fit.residual_mm,
-        "lasting": fit.lasting,
+        "lasting": fit.lasting if can.transferable else None,
         "volume_cm3": fit.volume_cm3,
         "volume_interval_cm3": list(fit.volume_interval_cm3),
         "seconds": fit.seconds,
@@ -51,8 +55,7 @@ def evolution(
     if path not in ("population", "only"):
         return along_table(fit, Path(path))
     known = {covariate.name: covariate for covariate in fit.individual.atlas.covariates}
-    if along not in known:
-        raise InputError(f"unknown covariate '{along}'; this atlas has {', '.join(known)}")
+    require_known([along], known.values())
     if steps < 1:
         raise InputError(f"--steps is {steps}; give at least 1")
     first = fit.covariates[along] if start is None else start
@@ -116,6 +119,5 @@ def parsed(atlas: Atlas, texts: dict[str, str]) -> dict[str, float]:
         InputError: for an unknown covariate or a text that is no value of it.
     """
     known = {covariate.name: covariate for covariate in atlas.covariates}
-    if unknown := [name for name in texts if name not in known]:
-        raise InputError(f"unknown covariate '{unknown[0]}'; this atlas has {', '.join(known) or 'none'}")
+    require_known(texts, known.values())
     return {name: known[name].parse(text or "") for name, text in texts.items()}

@@ -80,7 +80,7 @@ def test_a_population_with_fewer_covariates_is_the_same_people(children):
     assert none.normalised().shape == (30, 0) and none.centre == {} and none.row(3) == {}
     assert none.contains({}) and none.has_data_at({})
     assert Population.from_json(none.to_json()).values.shape == (30, 0)
-    with pytest.raises(InputError, match="'age'; this atlas has none"):
+    with pytest.raises(InputError, match="'age'; its shapes depend on no covariates"):
         complete(none.covariates, {"age": 3})
 
 

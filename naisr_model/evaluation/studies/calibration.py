@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from naisr_model.atlas import Atlas
+from naisr_model.covariates import require_known
 from naisr_model.data.populations import PopulationVisit
 from naisr_model.errors import InputError
 from naisr_model.evaluation.held_out import aligned, known_population, opened, visits_of
@@ -63,9 +64,7 @@ class Calibration:
             raise InputError(f"--patients is {self.patients}; give 1 or more")
         atlas = opened(self.atlas)
         known_population(atlas)
-        names = atlas.population.names
-        if unknown := [name for name in self._told() if name not in names]:
-            raise InputError(f"unknown covariate '{unknown[0]}'; this atlas has {', '.join(names)}")
+        require_known(self._told(), atlas.covariates)
         inside = [one for one in self._everybody(atlas).values() if atlas.population.contains(one.values)]
         first = {visit.subject: visit for visit in reversed(inside)}
         chosen = list(dict.fromkeys(visit.subject for visit in inside))[: self.patients]

@@ -162,6 +162,7 @@ def test_the_command_tells_what_python_tells(egg_atlas, patient, tmp_path, capsy
     fit = Atlas.load(egg_atlas).fit(trimesh.load_mesh(patient))
     assert record["covariates"]["age"] == pytest.approx(fit.covariates["age"], abs=0.1)
     assert record["intervals"].keys() == {"age", "sex"} and record["inferred"] == ["age", "sex"]
+    assert record["lasting"] == fit.lasting
     assert record["volume_interval_cm3"][0] < record["volume_cm3"] < record["volume_interval_cm3"][1]
     assert f"volume: {record['volume_cm3']:.1f} cm³" in said and "residual:" in said
 
@@ -203,9 +204,10 @@ def test_a_model_without_covariates_is_only_fitted(egg_deepsdf, patient, words, 
     assert cli.main([command, str(patient), "--atlas", str(egg_deepsdf), *rest]) == 2
     said = capsys.readouterr().err
     if command == "fit":
-        assert "unknown covariate 'age'; this atlas has none" in said
+        assert "unknown covariate 'age'; its shapes depend on no covariates" in said
     else:
         assert "DeepSDF does not carry shapes to other covariates" in said and "naisr fit" in said
     given = [str(patient), "--atlas", str(egg_deepsdf), "--out", str(tmp_path / "out")]
-    assert cli.main(["fit", *given]) == 0
+    assert cli.main(["fit", *given, "--json", str(tmp_path / "fit.json")]) == 0
+    assert json.loads((tmp_path / "fit.json").read_text())["lasting"] is None
     assert "volume: " in capsys.readouterr().out and (tmp_path / "out" / "shapes.png").exists()
