@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
 
 from naisr_model.cli.console import bar
+from naisr_model.data.populations import POPULATIONS, population
+
+PopulationName = Annotated[str, Parameter(help=f"{' or '.join(POPULATIONS)}.")]
 
 
-def populate(name: str, out: Path, *, patients: int | None = None, seed: int = 0) -> None:
+def populate(name: PopulationName, out: Path, *, patients: int | None = None, seed: int = 0) -> None:
     """Write a synthetic population (meshes, landmarks, CSV) as a hospital would hand it over.
 
     Args:
-        name: airway or bodies.
+        name: one of the populations.
         out: folder to write into.
         patients: how many patients; left out, the population's own number.
         seed: the same seed gives the same files.
     """
-    from naisr_model.data.populations import population
-
     size = {} if patients is None else {"patients": patients}
     with bar(f"writing {name}") as progress:
         table = population(name).write_population(out, seed=seed, progress=progress, **size)

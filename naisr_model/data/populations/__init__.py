@@ -11,13 +11,15 @@ from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Protocol, cast
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
-import trimesh
-
-from naisr_model.data.align import Landmarks
 from naisr_model.errors import InputError
 from naisr_model.progress import SILENT, Progress
+
+if TYPE_CHECKING:  # the help of a command names the populations, and needs no meshes
+    import trimesh
+
+    from naisr_model.data.align import Landmarks
 
 POPULATIONS = MappingProxyType(
     {

@@ -96,9 +96,20 @@ def test_help_is_there_without_heavy_imports(word):
     probe = (
         "import sys; from naisr_model import cli\n"
         f"try: cli.main([{word!r}])\n"
-        "finally: assert not {'torch', 'numpy', 'pyvista'} & set(sys.modules)"
+        "finally: assert not {'torch', 'numpy', 'pyvista', 'trimesh'} & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
+
+
+def test_the_help_of_populate_names_every_population():
+    """In a program of its own, where the registry has one more."""
+    program = (
+        "from naisr_model.data import populations\n"
+        "populations.POPULATIONS = {**populations.POPULATIONS, 'pears': 'pears'}\n"
+        "from naisr_model import cli; cli.main(['populate', '--help'])"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert "airway or bodies or pears." in " ".join(done.stdout.replace("\u2502", " ").split())
 
 
 def test_the_package_runs_as_a_module():
