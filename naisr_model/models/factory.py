@@ -61,8 +61,16 @@ def build(preset: Preset, covariates: int) -> ShapeModel:
 
 
 def presets() -> dict[str, Preset]:
-    """The presets of all models by name."""
-    return {name: preset for model in MODELS for name, preset in _module(model).PRESETS.items()}
+    """The presets of all models by name.
+
+    Raises:
+        ValueError: when two models give the same name to theirs.
+    """
+    listed = [(name, preset) for model in MODELS for name, preset in _module(model).PRESETS.items()]
+    names = [name for name, _ in listed]
+    if twice := {name for name in names if names.count(name) > 1}:
+        raise ValueError(f"two models have a preset called {' and '.join(sorted(twice))}")
+    return dict(listed)
 
 
 def preset(name: str) -> Preset:
