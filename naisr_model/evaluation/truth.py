@@ -66,12 +66,14 @@ class TruthPoint:
 def truth_places(atlas: Atlas) -> dict[str, list[Place]]:
     """Places along the ``growth`` path, along each covariate (``effects``) and at the centre (``template``).
 
-    There are none where the population is not synthetic, or shapes do not depend on covariates.
+    There are none where the population is not synthetic, or shapes do not depend on covariates, and none at
+    the centre where the shape there is not the template.
     """
     module = synthetic(atlas)
     if module is None or not atlas.capabilities.evolvable:
         return {"growth": [], "effects": [], "template": []}
-    centre = atlas.population.centre
+    can, centre = atlas.capabilities, atlas.population.centre
+    template = Place(atlas.covariates[0].name, "template", centre)
     effects = [
         Place(covariate.name, "", centre | {covariate.name: value})
         for covariate in atlas.covariates
@@ -80,7 +82,7 @@ def truth_places(atlas: Atlas) -> dict[str, list[Place]]:
     return {
         "growth": [Place(*place) for place in module.growth_path()],
         "effects": effects,
-        "template": [Place(atlas.covariates[0].name, "template", centre)],
+        "template": [template] if can.has_template and can.vanishes_at_centre else [],
     }
 
 

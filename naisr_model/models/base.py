@@ -112,6 +112,7 @@ class DeformableModel(ShapeModel, ABC):
     def displacement(self, points: Tensor, covariates: Tensor, latents: Tensor) -> Tensor:
         """The whole displacement d, ``[shapes, n, dim]``."""
 
+    @final  # type: ignore[misc] # to torch it is an attribute that may be set
     def forward(self, points: Tensor, covariates: Tensor, latents: Tensor) -> Tensor:
         """As :meth:`ShapeModel.forward`."""
         return self.template(points + self.displacement(points, covariates, latents))

@@ -193,7 +193,7 @@ def _of_the_template(atlas: Atlas, row: int) -> list[Question]:
     can = atlas.capabilities
     return [
         *([Question("folding", 0)] if can.deformable else []),
-        *([Question("displacement", 0, row)] if can.deformable and can.disentangleable else []),
+        *([Question("displacement", 0, row)] if can.trackable else []),
     ]
 
 

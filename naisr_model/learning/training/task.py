@@ -18,7 +18,7 @@ from naisr_model.config import Preset, TrainingConfig
 from naisr_model.data.store import SampleStore
 from naisr_model.errors import InputError
 from naisr_model.learning.training.residual import covariate_basis
-from naisr_model.models.base import AdditiveModel, ShapeModel
+from naisr_model.models.base import ShapeModel
 from naisr_model.models.devices import usable_device
 from naisr_model.models.factory import build, model_class
 
@@ -158,8 +158,8 @@ def _check(preset: Preset) -> None:
         ("template_epochs", config.template_epochs, can.has_template),
         ("loss.template_eikonal", loss.template_eikonal, can.has_template),
         ("loss.folding", loss.folding, can.deformable),
-        ("loss.centring", loss.centring, issubclass(model, AdditiveModel)),
-        ("loss.ridge", loss.ridge, issubclass(model, AdditiveModel)),
+        ("loss.centring", loss.centring, can.trackable),
+        ("loss.ridge", loss.ridge, can.trackable),
     )
     for name, value, is_possible in wanted:
         if value and not is_possible:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import pytest
 from eggs import egg
 
 from naisr_model.atlas import Atlas
 from naisr_model.evaluation.held_out import opened
 from naisr_model.evaluation.truth import beside_truth, plausible_values, truth_places
+from naisr_model.models.factory import model_class
 from naisr_model.shipped import shipped_atlas
 
 
@@ -21,6 +24,15 @@ def test_places_lie_along_growth_along_each_covariate_and_at_the_centre(egg_peop
         others = [name for name in centre if name != place.covariate]
         assert all(place.values[name] == centre[name] for name in others)
     assert [place.values for place in places["template"]] == [centre]
+
+
+@pytest.mark.parametrize("lacking", ["has_template", "vanishes_at_centre"])
+def test_the_shape_at_the_centre_is_called_the_template_only_where_it_is(egg_people, monkeypatch, lacking):
+    atlas = Atlas.load(egg_people.atlas)
+    own = dataclasses.replace(atlas.capabilities, **{lacking: False})
+    monkeypatch.setattr(model_class(atlas.checkpoint.preset.model), "capabilities", own)
+    places = truth_places(atlas)
+    assert places["template"] == [] and places["growth"] and places["effects"]
 
 
 def test_the_truth_is_without_individual_variation(egg_people):

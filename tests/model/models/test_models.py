@@ -1,12 +1,15 @@
 """What every model of the factory promises, held against its own plain evaluation in double precision."""
 
 import dataclasses
+from importlib import import_module
+from types import MappingProxyType
 
 import pytest
 import torch
 
 from naisr_model.config import Preset, TrainingConfig
 from naisr_model.errors import InputError
+from naisr_model.models import factory
 from naisr_model.models.base import AdditiveModel, DeformableModel, ShapeModel, additive, deformable
 from naisr_model.models.derivatives import gradient
 from naisr_model.models.factory import MODELS, build, model_class, preset, presets, read_preset
@@ -18,6 +21,13 @@ def smallest(name: str) -> Preset:
     """The preset of a model whose networks have the fewest weights."""
     own = [one for one in presets().values() if one.model == name and one.network.dim == 3]
     return min(own, key=lambda one: sum(weight.numel() for weight in build(one, COVARIATES).parameters()))
+
+
+def models_that(can: str) -> list[str]:
+    """Names of the models with a capability; there has to be one, or nothing would be tested."""
+    found = [name for name in MODELS if getattr(model_class(name).capabilities, can)]
+    assert found
+    return found
 
 
 @pytest.fixture(params=MODELS)
@@ -77,16 +87,16 @@ def test_every_weight_has_one_learning_rate(model):
 
 def test_capabilities_say_what_the_class_is(model):
     can = model.capabilities
-    assert isinstance(model, DeformableModel) == (can.deformable and can.has_template)
-    if isinstance(model, AdditiveModel):
-        assert can.trackable and can.evolvable
+    assert isinstance(model, DeformableModel) == can.deformable == can.has_template
+    assert isinstance(model, AdditiveModel) == can.trackable
+    assert can.trackable <= can.evolvable
     assert can.transferable <= can.evolvable
+    assert can.vanishes_at_centre <= can.has_template
 
 
+@pytest.mark.parametrize("model", models_that("vanishes_at_centre"), indirect=True)
 def test_the_shape_at_the_centre_is_the_template_where_displacements_vanish(model, arguments):
     points, covariates, latents = arguments
-    if not model.capabilities.vanishes_at_centre:
-        return
     template = deformable(model).template(points)
     torch.testing.assert_close(model(points, torch.zeros_like(covariates), latents), template)
 
@@ -103,6 +113,14 @@ def test_what_a_model_is_not_is_refused_in_its_name():
 @pytest.mark.parametrize("name", presets())
 def test_a_preset_is_of_its_model_s_settings(name):
     assert type(preset(name).network) is model_class(preset(name).model).settings
+
+
+def test_a_preset_of_two_models_is_a_mistake(monkeypatch):
+    assert len(presets()) == sum(len(import_module(module).PRESETS) for module in MODELS.values())
+    twice = {**MODELS, "other": MODELS["deepsdf"]}
+    monkeypatch.setattr(factory, "MODELS", MappingProxyType(twice))
+    with pytest.raises(ValueError, match="two models have a preset called deepsdf-demo and deepsdf-paper"):
+        presets()
 
 
 def test_a_record_that_names_no_model_is_naisr_s():
