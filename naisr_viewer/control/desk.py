@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass, replace
 from functools import partial
@@ -127,8 +128,9 @@ class PatientDesk(QObject):
             covariate = atlas.covariates[atlas.index(name)]
             if not covariate.contains(value):
                 low, high = covariate.range
+                told = "no number" if math.isnan(value) else covariate.format(value)
                 self._window.show_error(
-                    f"{label(name)} is {covariate.format(value)}; the atlas was made from {low:g} to "
+                    f"{label(name)} is {told}; the atlas was made from {low:g} to "
                     f"{covariate.format(high)}. Correct it, or untick it to have it inferred."
                 )
                 return True

@@ -33,12 +33,11 @@ def style_sheet(theme: Theme) -> str:
     QToolBar QToolButton:checked:disabled {{ color: {t.muted}; background: {t.line};
                 border-color: {t.line}; }}
     QPushButton:focus {{ border-color: {t.accent}; }}
-    QDoubleSpinBox, QLineEdit {{ background: {t.raised}; border: 1px solid {t.line};
+    QLineEdit {{ background: {t.raised}; border: 1px solid {t.line};
                 border-radius: 5px; padding: 3px 6px; color: {t.text};
                 selection-background-color: {t.accent}; }}
-    QDoubleSpinBox::up-button, QDoubleSpinBox::down-button {{ width: 0; border: none; }}
-    QDoubleSpinBox QLineEdit {{ border: none; background: transparent; padding: 0 6px; }}
-    QDoubleSpinBox:focus, QLineEdit:focus {{ border-color: {t.accent}; }}
+    QLineEdit:focus {{ border-color: {t.accent}; }}
+    QLineEdit[isWrong="true"] {{ background: {t.error}; color: {t.on_error}; border-color: {t.on_error}; }}
     QStatusBar {{ background: {t.window}; border-top: 1px solid {t.line}; }}
     QStatusBar::item {{ border: none; }}
     QProgressBar {{ background: {t.line}; border: none; border-radius: 3px; max-height: 6px; }}

@@ -10,8 +10,9 @@ from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QLabel, QToolBut
 from naisr_model.covariates import Covariate
 from naisr_viewer.views.covariates.histogram import Histogram
 from naisr_viewer.views.covariates.slider import JumpSlider, slider_position, slider_value
+from naisr_viewer.views.level_buttons import LevelButton, level_buttons
+from naisr_viewer.views.number_box import NumberBox
 from naisr_viewer.views.theme import Theme
-from naisr_viewer.views.value_inputs import LevelButton, ValueBox, level_buttons
 from naisr_viewer.words.numbers import mean_reading, reading
 from naisr_viewer.words.titles import label
 
@@ -36,7 +37,7 @@ class CovariateRow(QWidget):
         self.slider.setAccessibleName(label(covariate.name))
         self.histogram = Histogram(covariate, observed, self)
         self.reset = _reset_button(covariate, self)
-        self.spin = ValueBox(covariate, self) if covariate.kind == "continuous" else None
+        self.box = NumberBox(covariate, self) if covariate.kind == "continuous" else None
         self.buttons = level_buttons(covariate, self) if covariate.kind == "binary" else []
         self.reading = QLabel(self)
         self.reading.setObjectName("muted")
@@ -70,9 +71,8 @@ class CovariateRow(QWidget):
         """Show a real value without telling anybody."""
         with QSignalBlocker(self.slider):
             self.slider.setValue(slider_position(self.covariate, value))
-        if self.spin is not None:
-            with QSignalBlocker(self.spin):
-                self.spin.setValue(value)
+        if self.box is not None:
+            self.box.show_value(value)
         for button in self.buttons:
             button.setChecked(button.level == value)
         self.reset.setEnabled(value != self._home)
@@ -101,10 +101,10 @@ class CovariateRow(QWidget):
         head.setSpacing(6)
         head.addWidget(name)
         head.addStretch(1)
-        for widget in (self.reading, self.spin, unit, self.reset):
+        for widget in (self.reading, self.box, unit, self.reset):
             if widget is not None:
                 head.addWidget(widget)
-        self.reading.setVisible(self.spin is None)
+        self.reading.setVisible(self.box is None)
         unit.setVisible(bool(self.covariate.unit))
         track = QGridLayout()
         track.setHorizontalSpacing(4)
@@ -129,8 +129,8 @@ class CovariateRow(QWidget):
         self.slider.sliderReleased.connect(self._settled)
         self._settle.timeout.connect(self._settled)
         self.reset.clicked.connect(lambda: self.reset_requested.emit(self.covariate.name))
-        if self.spin is not None:
-            self.spin.valueChanged.connect(self._moved)
+        if self.box is not None:
+            self.box.committed.connect(self._moved)
         for button in self.buttons:
             button.clicked.connect(self._level_chosen)
 

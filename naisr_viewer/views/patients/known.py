@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QLabel, QWidget
 
 from naisr_model.covariates import Covariate
 from naisr_viewer.state.patients import Named, OpenScan
+from naisr_viewer.views.level_buttons import LevelButton, level_buttons
+from naisr_viewer.views.number_box import NumberBox
 from naisr_viewer.views.patients.pieces import button, exchange, grid_in, paragraph, section
-from naisr_viewer.views.value_inputs import LevelButton, ValueBox, level_buttons
 from naisr_viewer.words.titles import label
 
 FIT_TIP = "Find the shape of the atlas that comes closest to the scan"
@@ -18,38 +19,31 @@ FIT_TIP = "Find the shape of the atlas that comes closest to the scan"
 ADVICE = "Tick what is known; the rest is inferred from the shape."
 NOTHING_TO_KNOW = "The shapes of this atlas depend on no covariates; there is nothing to be known."
 
-FAR = 1e6
-"""Beyond any value of a covariate."""
 
-
-class NumberField(ValueBox):
+class NumberField(NumberBox):
     """The value of a continuous covariate; empty while it is to be inferred."""
 
     edited = Signal()  # the user gave a value or took it away
 
-    is_given = False
-
     def __init__(self, covariate: Covariate, parent: QWidget) -> None:
         super().__init__(covariate, parent)
-        self.covariate = covariate
         self.stops: list[QWidget] = [self]
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setRange(-FAR, FAR)  # what is out of range is told, not turned into something else
-        self.lineEdit().setPlaceholderText("infer")
-        self.lineEdit().textEdited.connect(self._typed)
+        self.setPlaceholderText("infer")
+        self.textEdited.connect(lambda _: self.edited.emit())
+        self.committed.connect(lambda _: self.edited.emit())
+
+    @property
+    def is_given(self) -> bool:
+        """Whether anything stands there."""
+        return self.value is not None
 
     def given(self) -> float | None:
-        """What was typed, or None; an end of the observed range that the box had to round is that end."""
-        self.interpretText()
-        value, step = self.value(), 10.0 ** -self.decimals()
-        ends = (end for end in self.covariate.range if abs(value - end) < step)
-        return next(ends, value) if self.is_given else None
+        """What was typed, also outside the range; NaN for what is no number, None for nothing."""
+        return self.value
 
     def give(self, value: float | None) -> None:
         """Show a value, or that there is none."""
-        self.is_given = value is not None
-        with QSignalBlocker(self):
-            self.setValue(self.covariate.centre if value is None else value)
+        self.put(value)
 
     def ask(self) -> None:
         """Propose the population mean, to be typed over."""
@@ -57,19 +51,9 @@ class NumberField(ValueBox):
         self.setFocus()
         self.selectAll()
 
-    def textFromValue(self, value: float) -> str:
-        """Nothing for no value."""
-        return super().textFromValue(value) if self.is_given else ""
-
-    def stepBy(self, steps: int) -> None:
-        """Arrow keys and the wheel begin at the population mean."""
-        self.is_given = True
-        super().stepBy(steps)
-        self.edited.emit()
-
-    def _typed(self, text: str) -> None:
-        self.is_given = bool(text.strip())
-        self.edited.emit()
+    def _emptied(self) -> None:
+        """Nothing means: to be inferred."""
+        self.put(None)
 
 
 class LevelField(QWidget):

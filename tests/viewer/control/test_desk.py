@@ -154,11 +154,11 @@ def test_years_ahead_before_and_after(fitted, qtbot):
     window, controller = fitted
     action(window, "Before and after").trigger()
     settle(qtbot, controller)
-    spin = window.covariates.rows["age"].spin
-    spin.setFocus()
-    spin.selectAll()
-    QTest.keyClicks(spin, "8.5")
-    QTest.keyClick(spin, Qt.Key.Key_Return)
+    box = window.covariates.rows["age"].box
+    box.setFocus()
+    box.selectAll()
+    QTest.keyClicks(box, "8.5")
+    QTest.keyClick(box, Qt.Key.Key_Return)
     qtbot.waitUntil(lambda: not controller.is_moving and not controller.is_busy, timeout=60_000)
     assert set(controller.shown) >= {BEFORE, FULL_SHAPE, CHANGE}
     before, after, change = (controller.shown[panel] for panel in (BEFORE, FULL_SHAPE, CHANGE))
@@ -334,11 +334,11 @@ def test_a_value_the_atlas_never_saw_is_not_turned_into_another(ready, qtbot, sc
 
 def test_a_movement_ends_with_its_patient(fitted, qtbot):
     window, controller = fitted
-    spin = window.covariates.rows["age"].spin
-    spin.setFocus()
-    spin.selectAll()
-    QTest.keyClicks(spin, "8")
-    QTest.keyClick(spin, Qt.Key.Key_Return)
+    box = window.covariates.rows["age"].box
+    box.setFocus()
+    box.selectAll()
+    QTest.keyClicks(box, "8")
+    QTest.keyClick(box, Qt.Key.Key_Return)
     window.patients.patient_chosen.emit(None)  # before the movement counts as at rest
     qtbot.wait(600)
     settle(qtbot, controller)

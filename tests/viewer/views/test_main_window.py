@@ -149,7 +149,7 @@ def test_undo_and_reset_by_keyboard(ready, qtbot):
     window.activateWindow()
     press_keys(window, "Ctrl+Z")
     assert controller.state.values == (100.0, 35.0, 0.0)
-    assert window.covariates.rows["age"].spin.value() == 100.0
+    assert window.covariates.rows["age"].box.value == 100.0
     press_keys(window, "Ctrl+Shift+Z")
     assert controller.state.values == changed
     qtbot.waitUntil(window.isActiveWindow)  # only then it hears keys

@@ -57,7 +57,7 @@ def at(slider: JumpSlider, share: float) -> QPoint:
 def test_showing_a_value_says_nothing(panel, heard, card):
     state = with_value(opened(ExplorerState(), card), "age", 180)
     panel.show_values(with_value(state, "sex", 1))
-    assert panel.rows["age"].spin.value() == 180
+    assert panel.rows["age"].box.value == 180
     assert panel.rows["age"].slider.value() == slider_position(card.covariates[0], 180)
     assert [button.isChecked() for button in panel.rows["sex"].buttons] == [False, True]
     assert heard == []
@@ -103,11 +103,11 @@ def test_several_keys_are_one_change(panel, heard, qtbot):
 
 
 def test_a_typed_number_is_taken_exactly(panel, heard, qtbot):
-    spin = panel.rows["weight"].spin
-    spin.selectAll()
-    QTest.keyClicks(spin, "42.5")
+    box = panel.rows["weight"].box
+    box.selectAll()
+    QTest.keyClicks(box, "42.5")
     assert heard == []  # not before it is finished
-    QTest.keyClick(spin, Qt.Key.Key_Return)
+    QTest.keyClick(box, Qt.Key.Key_Return)
     qtbot.waitUntil(lambda: ("settled", "weight", 42.5) in heard, timeout=2000)
 
 

@@ -1,0 +1,157 @@
+"""What a number is typed into: no keystroke is dropped, and nothing is turned into something else."""
+
+from __future__ import annotations
+
+import math
+import re
+
+from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtGui import QFocusEvent, QKeyEvent, QWheelEvent
+from PySide6.QtWidgets import QLineEdit, QWidget
+
+from naisr_model.covariates import Covariate
+from naisr_viewer.words.numbers import decimals
+from naisr_viewer.words.titles import label
+
+WIDTH_PX = 76
+NUMBER = re.compile(r"[-+−]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+−]?\d+)?")
+"""With a decimal point or comma, whatever the language of the system is."""
+
+STEPS = {Qt.Key.Key_Up: 1, Qt.Key.Key_Down: -1, Qt.Key.Key_PageUp: 10, Qt.Key.Key_PageDown: -10}
+EDITING = (Qt.Key.Key_A, Qt.Key.Key_C, Qt.Key.Key_V, Qt.Key.Key_X)
+"""With Ctrl, what a box that holds no unfinished text keeps from the window's shortcuts."""
+
+
+def parsed(text: str) -> float | None:
+    """A number as people write it; None for nothing, NaN for what is no number."""
+    text = text.strip()
+    if not text:
+        return None
+    if not NUMBER.fullmatch(text):
+        return math.nan
+    return float(text.replace(",", ".").replace("−", "-"))
+
+
+class NumberBox(QLineEdit):
+    """A real value of a continuous covariate.
+
+    What is no number, or outside the observed range, stays as it was typed, is marked and is not taken.
+    """
+
+    committed = Signal(float)  # a number inside the range is finished: by Enter, focus, arrow keys or wheel
+
+    def __init__(self, covariate: Covariate, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.covariate = covariate
+        self._taken: float | None = None
+        self.setAlignment(Qt.AlignmentFlag.AlignRight)
+        self.setFixedWidth(WIDTH_PX)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setAccessibleName(f"{label(covariate.name)} in {covariate.unit}".removesuffix(" in "))
+        self.textChanged.connect(self._mark)
+        self._mark()
+
+    @property
+    def value(self) -> float | None:
+        """What the text says, to the last digit of what was shown; None for nothing, NaN for no number."""
+        return self._taken if self.text() == self._written(self._taken) else parsed(self.text())
+
+    @property
+    def complaint(self) -> str:
+        """Why the text is not taken, with the range; empty where it is fine."""
+        value = self.value
+        if value is None or self.covariate.contains(value):
+            return ""
+        low, high = self.covariate.range
+        told = "no number" if math.isnan(value) else "outside the data behind the atlas"
+        return f"“{self.text()}” is {told}: {low:g} to {self.covariate.format(high)}"
+
+    @property
+    def step(self) -> float:
+        """What an arrow key adds."""
+        return float(10.0 ** (1 - decimals(self.covariate)))
+
+    def show_value(self, value: float | None) -> None:
+        """Show a value, or nothing, telling nobody; what is being typed over the same value stays."""
+        if value != self._taken or not self._is_unfinished:
+            self.put(value)
+
+    def put(self, value: float | None) -> None:
+        """Show a value, or nothing, in place of whatever was being typed; nobody is told."""
+        self._taken = value
+        if self.text() != self._written(value):
+            self.setText(self._written(value))
+
+    def step_by(self, steps: int) -> None:
+        """Up or down from what is there, or from the population mean, inside the range."""
+        value, (low, high) = self.value, self.covariate.range
+        start = self.covariate.centre if value is None or math.isnan(value) else value
+        self._take(min(max(start + steps * self.step, low), high))
+
+    def finish(self) -> None:
+        """Take what was typed, if it can be taken."""
+        value = self.value
+        if value is None:
+            self._emptied()
+        elif value != self._taken and not self.complaint:
+            self._take(value)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Enter finishes, Esc takes back what was typed, arrows step."""
+        key = event.key()
+        if key in STEPS:
+            self.step_by(STEPS[Qt.Key(key)])
+        elif key in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            self.finish()
+        elif key == Qt.Key.Key_Escape and self._is_unfinished:
+            self.put(self._taken)
+        else:
+            super().keyPressEvent(event)
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        """What was typed is finished."""
+        super().focusOutEvent(event)
+        if event.reason() != Qt.FocusReason.PopupFocusReason:
+            self.finish()
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Step where the box has the focus; else the wheel belongs to what scrolls."""
+        turned = event.angleDelta().y()
+        if self.hasFocus() and turned:
+            self.step_by(1 if turned > 0 else -1)
+        else:
+            event.ignore()
+
+    def event(self, event: QEvent) -> bool:
+        """Leave shortcuts to the window unless something is being typed."""
+        if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent):
+            if self._is_unfinished and event.key() == Qt.Key.Key_Escape:
+                event.accept()
+                return True
+            with_control = event.modifiers() & Qt.KeyboardModifier.ControlModifier
+            if with_control and not self._is_unfinished and event.key() not in EDITING:
+                event.ignore()
+                return False
+        return super().event(event)
+
+    @property
+    def _is_unfinished(self) -> bool:
+        return self.text() != self._written(self._taken)
+
+    def _take(self, value: float) -> None:
+        self.put(value)
+        self.committed.emit(value)
+
+    def _emptied(self) -> None:
+        """Nothing is no value here."""
+        self.put(self._taken)
+
+    def _written(self, value: float | None) -> str:
+        return "" if value is None else f"{value:.{decimals(self.covariate)}f}"
+
+    def _mark(self) -> None:
+        low, high = self.covariate.range
+        self.setToolTip(self.complaint or f"{low:g} to {self.covariate.format(high)}")
+        self.setProperty("isWrong", bool(self.complaint))
+        self.style().unpolish(self)
+        self.style().polish(self)
