@@ -35,7 +35,7 @@ SYSTEM_NEEDS := \
 .PHONY: help env system run test figures lint lock clean
 
 help: ## say what can be done
-	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 14
+	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 16
 
 env: $(STAMP) ## make .venv with everything installed (cheap when nothing changed)
 

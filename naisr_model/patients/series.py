@@ -66,7 +66,10 @@ def _write_table(path: Path, records: Sequence[dict[str, float | str]]) -> None:
 
 def _write_picture(path: Path, people: Sequence[Individual]) -> None:
     """The shapes side by side, at one scale and seen from one side."""
-    plotter = pv.Plotter(off_screen=True, shape=(1, len(people)), window_size=(PIXELS * len(people), PIXELS))
+    with pv.vtk_verbosity("error"):  # without a display VTK warns of it, then draws all the same
+        plotter = pv.Plotter(
+            off_screen=True, shape=(1, len(people)), window_size=(PIXELS * len(people), PIXELS)
+        )
     for column, person in enumerate(people):
         plotter.subplot(0, column)
         if len(person.surface.faces):

@@ -18,6 +18,7 @@ from naisr_viewer.control.preparation import Preparation
 from naisr_viewer.control.refinement import Refinement
 from naisr_viewer.control.worker import Worker
 from naisr_viewer.engine.engine import Engine
+from naisr_viewer.files.exports import in_the_way, planned
 from naisr_viewer.files.surfaces import write_atomically
 from naisr_viewer.panels.kinds import with_layout_of
 from naisr_viewer.state.atlas_card import AtlasCard, RealVector
@@ -96,12 +97,21 @@ class Controller(QObject):
             state = with_value(state, name, value)
         self.go(state)
 
-    def export(self, choice: ExportChoice) -> None:
-        """Write surfaces at the present values; what is missing is computed first."""
-        if self.state.atlas is not None:
-            job = jobs.exporting(self._engine, self.state, choice)
-            told = f"Exporting into {choice.folder} …"
-            self.refinement.run(told, job, lambda report: self.refinement.tell(report.sentence))
+    def export(self, choice: ExportChoice, replaces: bool = False) -> None:
+        """Write surfaces at the present values; what is missing is computed first.
+
+        Args:
+            choice: what to write and where.
+            replaces: whether files that are there already are replaced without a question.
+        """
+        if self.state.atlas is None:
+            return
+        others = [] if replaces else in_the_way(planned(self.state, choice))
+        if others and not self._window.ask_replace(others):
+            return
+        job = jobs.exporting(self._engine, self.state, choice)
+        told = f"Exporting into {choice.folder} …"
+        self.refinement.run(told, job, lambda report: self.refinement.tell(report.sentence))
 
     def save_screenshot(self, path: Path) -> None:
         """Write a picture of the whole window; the ending of ``path`` says which kind."""

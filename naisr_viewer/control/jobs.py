@@ -10,8 +10,8 @@ from naisr_model.progress import Progress
 from naisr_viewer.control.worker import Deliver, Job
 from naisr_viewer.engine.clinic import Clinic
 from naisr_viewer.engine.engine import Engine
-from naisr_viewer.files import surfaces
-from naisr_viewer.panels.kinds import request_for
+from naisr_viewer.files.exports import planned
+from naisr_viewer.files.surfaces import write_surface
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.patients import Fitted, Labels, Named, Reading, Scan
@@ -58,17 +58,13 @@ def one_by_one(engine: Engine, requests: Sequence[SurfaceRequest]) -> Job[Surfac
 
 def exporting(engine: Engine, state: ExplorerState, choice: ExportChoice) -> Job[ExportReport]:
     """Writes surfaces at the values of ``state``, computing what is missing; hands over a report."""
-    atlas = state.atlas
+    atlas, plan = state.atlas, planned(state, choice)
     assert atlas is not None
-    requests = [request_for(state, panel, choice.resolution) for panel in choice.panels]
 
     def job(deliver: Deliver[ExportReport], progress: Progress) -> None:
-        for request, piece in progress.over(requests):
-            owner = state.shown if request.person else None
-            result = engine.surface(request, piece)
-            path = choice.folder / f"{surfaces.file_stem(atlas, result, owner)}.{choice.format}"
-            surfaces.write_surface(path, result, atlas, owner)
-        deliver(ExportReport(len(requests), choice))
+        for (request, path, owner), piece in progress.over(plan):
+            write_surface(path, engine.surface(request, piece), atlas, owner)
+        deliver(ExportReport(len(plan), choice))
 
     return job
 

@@ -54,11 +54,16 @@ def write_surface(
     ending = path.suffix.lower().removeprefix(".")
     if ending not in FORMATS:
         raise InputError(f"cannot write '{path.name}'; the ending must be one of {', '.join(FORMATS)}")
-    beside = path.with_suffix(".json")
+    beside = record_of(path)
     write_atomically(path, lambda place: _write_mesh(place, ending, result))
     text = json.dumps(description(result, atlas, path.name, patient), indent=2, ensure_ascii=False) + "\n"
     write_atomically(beside, lambda place: place.write_text(text, encoding="utf-8"))
     return path, beside
+
+
+def record_of(path: Path) -> Path:
+    """The record of a mesh file, and of no other: ``shape.stl`` has ``shape.stl.json``."""
+    return path.with_name(f"{path.name}.json")
 
 
 def description(
@@ -76,6 +81,8 @@ def description(
         "depends_on": sorted(given),
         "length_unit": "mm",
         "volume_cm3": round(result.volume_cm3, 4),
+        "volume_cm3_is": "of the smooth surface through the vertices, as in the window",
+        "volume_of_triangles_cm3": round(_triangles_cm3(result), 4),
         "volume_95_percent_margin_cm3": None if margin is None else round(margin, 4),
         "patient": None if patient is None else _patient_record(patient),
         "vertices": len(result.points_mm),
@@ -85,18 +92,10 @@ def description(
     }
 
 
-def file_stem(atlas: AtlasCard, result: SurfaceResult, patient: OpenScan | None = None) -> str:
-    """A telling file name without an ending: ``airway-age-only``, ``airway-p01-full-shape``."""
-    person = "" if patient is None else f"{_plain_name(patient)}-"
-    words = f"{atlas.name}-{person}{title_of(result.request.panel)}".lower()
-    return "-".join(words.replace("/", " ").split())
-
-
-def _plain_name(patient: OpenScan) -> str:
-    """The name without the file's ending and without parentheses: ``p01.stl (2)`` is ``p01 2``."""
-    file = patient.reading.path.name
-    stem = file.removesuffix(".gz").rpartition(".")[0] or file
-    return patient.name.replace(file, stem).replace("(", "").replace(")", "")
+def _triangles_cm3(result: SurfaceResult) -> float:
+    """What the flat triangles of the file enclose (divergence theorem)."""
+    a, b, c = np.moveaxis(result.points_mm.astype(np.float64)[result.faces], 1, 0)
+    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6000
 
 
 def _patient_record(patient: OpenScan) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from PySide6.QtTest import QTest
 
 from naisr_model.errors import InputError
 from naisr_viewer.control.controller import Controller
-from naisr_viewer.files import surfaces
+from naisr_viewer.files.exports import planned
 from naisr_viewer.panels.kinds import layouts_of, panels_in
 from naisr_viewer.state.layouts import FULL_SHAPE, Layout
 from naisr_viewer.state.requests import EXACT_RESOLUTION, ExportChoice
@@ -78,7 +78,7 @@ def run_demo(window: MainWindow, controller: Controller, folder: Path) -> None:
     """Drag every slider from end to end with real mouse events; leave pictures and meshes behind.
 
     At last a full shape that was exported is opened as if it were a patient's, fitted and moved. What the
-    atlas cannot do is left out.
+    atlas cannot do, or has no slider for, is left out.
 
     Raises:
         InputError: when the window reports an error.
@@ -109,12 +109,13 @@ def _export_moved(window: MainWindow, controller: Controller, folder: Path) -> P
     for row in rows[:1]:
         drag(row, 0.5, 0.75)
     _picture(window, controller, folder / "full-shape.png")
-    everything = panels_in(Layout.SIDE_BY_SIDE, atlas)
-    controller.export(ExportChoice(everything, "stl", EXACT_RESOLUTION, folder))
+    choice = ExportChoice(panels_in(Layout.SIDE_BY_SIDE, atlas), "stl", EXACT_RESOLUTION, folder)
+    plan = planned(controller.state, choice)
+    controller.export(choice, replaces=True)
     finish(window, controller)
     for row in rows[:1]:
         row.reset.click()
-    return folder / f"{surfaces.file_stem(atlas, controller.shown[FULL_SHAPE])}.stl"
+    return next(each.path for each in plan if each.request.panel == FULL_SHAPE)
 
 
 def _fit_and_move(window: MainWindow, controller: Controller, folder: Path, scan: Path) -> None:
@@ -125,9 +126,10 @@ def _fit_and_move(window: MainWindow, controller: Controller, folder: Path, scan
     window.patients.known.fit.click()
     _picture(window, controller, folder / "patient-fit.png")
     print("fitted the exported full shape")
-    if Layout.CHANGE in layouts_of(atlas):
+    rows = list(window.covariates.rows.items())
+    if rows and Layout.CHANGE in layouts_of(atlas):
         controller.set_layout(Layout.CHANGE)
-        name, row = next(iter(window.covariates.rows.items()))
+        name, row = rows[0]
         drag(row, row.slider.sliderPosition() / SLIDER_STEPS, 0.25)
         _picture(window, controller, folder / "patient-before-and-after.png")
         print(f"moved it along {name}")

@@ -32,6 +32,7 @@ from naisr_viewer.views.dialogs.documents import DocumentWindow
 from naisr_viewer.views.dialogs.export import ExportDialog
 from naisr_viewer.views.dialogs.files import ask_image_path, ask_open_path, ask_scan_path, dropped, is_atlas
 from naisr_viewer.views.dialogs.label import ask_label
+from naisr_viewer.views.dialogs.replace import ask_replace
 from naisr_viewer.views.patients.panel import PatientPanel
 from naisr_viewer.views.recent_menu import RecentMenu
 from naisr_viewer.views.shapes.shape_view import ShapeView
@@ -203,6 +204,10 @@ class MainWindow(QMainWindow):
         path = ask_image_path(self, self._state)
         if path is not None:
             self.screenshot_requested.emit(path)
+
+    def ask_replace(self, files: Sequence[Path]) -> bool:
+        """Whether files that are there already may be replaced."""
+        return ask_replace(self, files)
 
     def ask_label(self, labels: Labels) -> int | None:
         """Which label of a volume; None when nobody chose."""

@@ -68,7 +68,9 @@ class ExportDialog(QDialog):
         form.addRow("Format", self.format)
         form.addRow("Detail", self.detail)
         form.addRow("Folder", where)
-        note = QLabel("Millimetres. A .json beside each file records the covariates and the atlas.", self)
+        note = QLabel(
+            "Millimetres. A record beside each file (.json) tells the covariates and the atlas.", self
+        )
         note.setObjectName("muted")
         note.setWordWrap(True)
         column = column_in(self)

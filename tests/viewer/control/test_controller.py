@@ -257,10 +257,27 @@ def test_export_writes_what_is_asked_for_even_out_of_view(ready, window, tmp_pat
         ExportChoice(panels_in(Layout.SIDE_BY_SIDE, card), "ply", 64, tmp_path / "new folder")
     )
     names = sorted(path.name for path in (tmp_path / "new folder").iterdir())
-    views = ["age-only", "full-shape", "sex-only", "template", "weight-only"]
-    assert names == sorted(f"ellipsoid-{view}.{ending}" for view in views for ending in ("json", "ply"))
+    values = ["age100", "weight35", "sex0"]
+    views = ["template", "_".join(["full-shape", *values])]
+    views += [f"{value.rstrip('0123456789')}-only_{value}" for value in values]
+    assert names == sorted(f"ellipsoid-{view}.ply{ending}" for view in views for ending in ("", ".json"))
     assert "Exported 5 surfaces as PLY" in status(window)
     window.set_editable.assert_called_with(True)
+
+
+def test_an_export_replaces_nothing_unasked(ready, window, tmp_path):
+    choice = ExportChoice((FULL_SHAPE,), "stl", 64, tmp_path / "out")
+    window.export_requested.emit(choice)
+    window.ask_replace.assert_not_called()
+    (mesh,) = choice.folder.glob("*.stl")
+    mesh.write_text("mine")
+    window.ask_replace.return_value = False
+    window.export_requested.emit(choice)
+    assert window.ask_replace.call_args.args[0] == [mesh, mesh.with_name(f"{mesh.name}.json")]
+    assert mesh.read_text() == "mine"
+    window.ask_replace.return_value = True
+    window.export_requested.emit(choice)
+    assert mesh.stat().st_size > 1000
 
 
 def test_export_into_an_impossible_folder_is_explained(ready, window, tmp_path):

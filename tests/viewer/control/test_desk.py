@@ -311,9 +311,9 @@ def test_an_export_says_whose_shape_it_is(fitted, qtbot, tmp_path):
     _, controller = fitted
     controller.export(ExportChoice((FULL_SHAPE,), "stl", 64, tmp_path / "out"))
     settle(qtbot, controller)
-    record = json.loads((tmp_path / "out" / "eggs-p01-full-shape.json").read_text())
+    record = json.loads((tmp_path / "out" / "eggs-p01-full-shape_age6_sexM.stl.json").read_text())
     assert record["patient"]["known"] == {"age": 6.0, "sex": 1.0}
-    mesh = trimesh.load_mesh(tmp_path / "out" / "eggs-p01-full-shape.stl")
+    mesh = trimesh.load_mesh(tmp_path / "out" / "eggs-p01-full-shape_age6_sexM.stl")
     assert mesh.volume / 1000 == pytest.approx(CUBIC_CM, rel=0.05)
 
 
@@ -397,8 +397,9 @@ def test_exports_of_two_versions_of_a_file_do_not_meet(fitted, qtbot, tmp_path):
     for patient in controller.state.patients:
         window.patients.patient_chosen.emit(patient.key)
         settle(qtbot, controller)
-        controller.export(ExportChoice((TEMPLATE, FULL_SHAPE), "stl", 64, tmp_path / "out"))
+        controller.export(ExportChoice((TEMPLATE, FULL_SHAPE), "stl", 64, tmp_path / "out"), replaces=True)
         settle(qtbot, controller)
     names = {path.name for path in (tmp_path / "out").glob("*.stl")}
-    assert names == {"eggs-p01-full-shape.stl", "eggs-p01-2-full-shape.stl", "eggs-template.stl"}
-    assert json.loads((tmp_path / "out" / "eggs-template.json").read_text())["patient"] is None
+    full_shape = "full-shape_age6_sexM.stl"
+    assert names == {f"eggs-p01-{full_shape}", f"eggs-p01-2-{full_shape}", "eggs-template.stl"}
+    assert json.loads((tmp_path / "out" / "eggs-template.stl.json").read_text())["patient"] is None

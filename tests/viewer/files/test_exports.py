@@ -1,0 +1,60 @@
+"""What an export is named, and whether it meets files that are there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from naisr_viewer.files.exports import file_stem, in_the_way, planned
+from naisr_viewer.panels.kinds import panels_in
+from naisr_viewer.state.explorer import ExplorerState, opened, with_value
+from naisr_viewer.state.layouts import FULL_SHAPE, TEMPLATE, Layout, Panel
+from naisr_viewer.state.requests import ExportChoice, SurfaceRequest
+
+VALUES = (("age", 150.0), ("weight", 34.5), ("sex", 1.0))
+
+
+@pytest.fixture
+def state(card) -> ExplorerState:
+    return opened(ExplorerState(), card)
+
+
+def test_a_name_tells_the_values_it_was_made_at(card):
+    def stem(panel: Panel, *values: tuple[str, float]) -> str:
+        return file_stem(card, SurfaceRequest(card.path, panel, values, 64))
+
+    assert stem(TEMPLATE) == "ellipsoid-template"
+    assert stem(Panel("effect", "age"), ("age", 20.0)) == "ellipsoid-age-only_age20"
+    assert stem(FULL_SHAPE, *VALUES) == "ellipsoid-full-shape_age150_weight34.5_sexM"
+    assert stem(FULL_SHAPE, ("sex", -1.0)) == "ellipsoid-full-shape_sexF"
+    assert stem(FULL_SHAPE, ("sex", 0.5)) == "ellipsoid-full-shape_sex0.5"
+
+
+def test_two_values_of_one_slider_make_two_files(state, tmp_path):
+    choice = ExportChoice((FULL_SHAPE,), "stl", 64, tmp_path)
+    first, second = (planned(with_value(state, "age", age), choice)[0].path for age in (50.0, 50.5))
+    assert first != second
+
+
+def test_no_two_views_of_one_export_meet(state, card, tmp_path):
+    plan = planned(state, ExportChoice(panels_in(Layout.SIDE_BY_SIDE, card), "ply", 64, tmp_path))
+    assert len({each.path for each in plan}) == len(plan) == 5
+
+
+@pytest.mark.parametrize("name", ["../../etc", "a/b", "Wirbel säule", 'x"y', "a:b*c?", "{x} <b>"])
+def test_no_name_leaves_the_folder(state, card, tmp_path, name):
+    strange = replace(card, name=name)
+    stem = file_stem(strange, SurfaceRequest(card.path, FULL_SHAPE, (("age", 1.0),), 64))
+    path = tmp_path / f"{stem}.stl"
+    path.write_text("x")
+    assert path in tmp_path.iterdir()
+    assert not set(' <>:"/\\|?*{}') & set(stem)
+
+
+def test_meshes_and_records_that_are_there_are_in_the_way(state, tmp_path):
+    plan = planned(state, ExportChoice((TEMPLATE, FULL_SHAPE), "stl", 64, tmp_path))
+    assert in_the_way(plan) == []
+    (tmp_path / "ellipsoid-template.stl.json").write_text("{}")
+    (tmp_path / "another.stl").write_text("")
+    assert [file.name for file in in_the_way(plan)] == ["ellipsoid-template.stl.json"]
