@@ -14,8 +14,9 @@ import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
+from multiprocessing.connection import Connection
 from operator import itemgetter
 from typing import Protocol, TypeVar
 
@@ -29,6 +30,9 @@ Result = TypeVar("Result")
 
 POLL_S = 0.2
 """So long at most a cancelled run waits before it is noticed."""
+
+MOST_WORKERS = 61
+"""Windows lets a process wait for no more; whoever has more cores gives each worker more memory."""
 
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "IGL_NUM_THREADS")
 """What tells libraries that a process has yet to load how many threads to start."""
@@ -61,26 +65,27 @@ def processes(workers: int | None = None) -> Iterator[Run]:
         workers: how many; None for one a core, 1 to stay in this process.
 
     Raises:
-        InputError: for fewer than one.
+        InputError: for fewer than one, or more than :data:`MOST_WORKERS`.
     """
     count = cores() if workers is None else workers
-    if count < 1:
-        raise InputError(f"the number of workers is {count}; give at least 1")
+    if not 1 <= count <= MOST_WORKERS:
+        raise InputError(f"the number of workers is {count}; give 1 to {MOST_WORKERS}")
     if count == 1:
         yield _run_here
         return
     context = multiprocessing.get_context("spawn")
-    given_up = context.Event()
-    pool = ProcessPoolExecutor(
-        count, mp_context=context, initializer=_start_worker, initargs=(given_up.wait,)
-    )
-    try:
-        yield partial(_run_in, pool)
-    except BaseException:
-        given_up.set()
-        raise
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+    # Nothing is ever sent: its end, by a closed end here or a killed parent, is what tells the workers. An
+    # event would wait for the answer of a worker that was killed.
+    wanted, wanting = context.Pipe(duplex=False)
+    pool = ProcessPoolExecutor(count, mp_context=context, initializer=_start_worker, initargs=(wanted,))
+    with wanted, wanting:
+        try:
+            yield partial(_run_in, pool)
+        except BaseException:
+            wanting.close()
+            raise
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
 
 
 def in_order(results: Iterable[tuple[int, Result]]) -> list[Result]:
@@ -125,18 +130,16 @@ def _run_in(
         ) from error
 
 
-def _start_worker(until_given_up: Callable[[], object]) -> None:
-    """One thread a worker, which leaves when its parent says so and not at the Ctrl+C of a terminal."""
+def _start_worker(wanted: Connection) -> None:
+    """One thread a worker, which leaves when its parent does or says so, not at the Ctrl+C of a terminal."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.environ.update(dict.fromkeys(THREADS, "1"))
     threadpool_limits(1)
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-    # A killed parent cannot end its workers, and they would wait for work for ever.
-    for ends in (until_given_up, parent.join):
-        threading.Thread(target=_leave_after, args=(ends,), daemon=True).start()
+    threading.Thread(target=_leave_unwanted, args=(wanted,), daemon=True).start()
 
 
-def _leave_after(ends: Callable[[], object]) -> None:
-    ends()
+def _leave_unwanted(wanted: Connection) -> None:
+    """End this process when the other end of ``wanted`` is closed, whatever it is at."""
+    with suppress(OSError, EOFError):
+        wanted.recv_bytes()
     os._exit(1)

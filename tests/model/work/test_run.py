@@ -55,6 +55,11 @@ def test_a_result_is_there_before_the_other_jobs_are_done():
             list(results)
 
 
+def test_a_worker_that_was_killed_ends_the_work_with_a_sentence():
+    with pytest.raises(InputError, match="run again with fewer workers"), processes(2) as work:
+        list(work(eval, ["1", "__import__('os').kill(__import__('os').getpid(), 9)", "2", "3"]))
+
+
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_mistake_in_a_job_is_raised_here(workers):
     with processes(workers) as work, pytest.raises(ValueError, match=r"math domain|nonnegative"):
@@ -87,8 +92,12 @@ def test_what_is_still_at_work_is_given_up():
 
 
 def test_a_number_of_workers_that_makes_no_sense():
-    with pytest.raises(InputError, match="the number of workers is 0; give at least 1"), processes(0):
-        pass
+    for count in (0, -1, 99_999_999_999):
+        with (
+            pytest.raises(InputError, match=f"the number of workers is {count}; give 1 to"),
+            processes(count),
+        ):
+            pass
     assert cores() >= 1
 
 
