@@ -11,6 +11,7 @@ from cyclopts import App, Parameter
 
 from naisr_model.cli.console import bar, write_json
 from naisr_model.cli.options import JsonFile
+from naisr_model.errors import InputError
 from naisr_model.evaluation.studies import STUDIES
 from naisr_model.evaluation.study import Study, run
 
@@ -28,6 +29,8 @@ def _command(name: str, kind: type[Study[Any]]) -> Callable[..., None]:
     def measure(
         study: Any, *, journal: JournalFile = None, workers: Workers = 1, json_file: JsonFile = None
     ) -> None:
+        if journal is not None and json_file == journal:
+            raise InputError(f"{journal} is to be the journal and the report; name two files")
         with bar(name) as progress:
             report = run(study, workers=workers, journal=journal, progress=progress)
         print(study.markdown(report))

@@ -43,6 +43,8 @@ def read(path: Path, identity: Record) -> dict[str, Record]:
     first, *cases = [_parsed(path, line) for line in _complete_lines(path, identity)] or [identity]
     if first != identity:
         raise InputError(f"{path} keeps {_other(first, identity)}; name another journal, or delete this one")
+    if not all(isinstance(case.get("key"), str) and isinstance(case.get("record"), dict) for case in cases):
+        raise _no_journal(path)
     return {case["key"]: case["record"] for case in cases}
 
 

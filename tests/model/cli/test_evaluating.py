@@ -44,3 +44,11 @@ def test_a_journal_of_another_evaluation_is_refused(egg_atlas, egg_store, tmp_pa
     assert cli.main([*words, "--limit", "1", "--workers", "0"]) == 2
     assert "the number of workers is 0" in capsys.readouterr().err
     assert journal.read_bytes() == kept
+
+
+def test_the_journal_is_not_replaced_by_the_report(egg_atlas, egg_store, tmp_path, capsys):
+    path = str(tmp_path / "both.jsonl")
+    words = ["evaluate", "completion", str(egg_atlas), "--store", str(egg_store.path)]
+    assert cli.main([*words, "--journal", path, "--json", path]) == 2
+    assert "name two files" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []

@@ -16,6 +16,7 @@ from naisr_model.evaluation.journal import keeping, plain, read
 
 ROOT = Path(__file__).parents[3]
 WHAT = {"program": "1f", "study": "Reach", "atlas": "ab12", "limit": 2}
+SAME = json.dumps(WHAT) + "\n"
 
 
 @pytest.fixture
@@ -76,11 +77,14 @@ def test_a_journal_of_something_else_is_refused(path, change, message):
     assert path.read_bytes() == before
 
 
-@pytest.mark.parametrize("content", ["age,sex\n1,2\n", "[1]\n", "precious", '{"program": "1f", "st'])
+@pytest.mark.parametrize(
+    "content",
+    ["age,sex\n1,2\n", "[1]\n", "precious", SAME * 2, SAME + '{"foo": 1}\n', '{"program": "1f", "st'],
+)
 def test_no_other_file_is_taken_for_a_journal(tmp_path, content):
     path = tmp_path / "data.csv"
     path.write_text(content)
-    if content.startswith('{"program"'):
+    if not content.endswith("\n") and content.startswith('{"program"'):
         assert read(path, WHAT) == {}
         return
     with pytest.raises(InputError, match="no journal of an evaluation; name another file"):
