@@ -190,7 +190,10 @@ def _converted(kind: Any, value: Any, base: Any, where: str) -> Any:
             raise InputError(f"setting '{where}' is {value!r}; expected a table")
         return from_json(base, value, f"{where}.")
     if typing.get_origin(kind) is tuple:
-        return tuple(value)
+        (one, _) = typing.get_args(kind)
+        if not isinstance(value, list | tuple):
+            raise InputError(f"setting '{where}' is {value!r}; expected a list of {one.__name__}")
+        return tuple(_converted(one, each, None, where) for each in value)
     if kind is float and isinstance(value, int) and not isinstance(value, bool):
         return float(value)
     if not isinstance(value, kind) or isinstance(value, bool) is not (kind is bool):

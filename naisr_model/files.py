@@ -9,13 +9,20 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from naisr_model.errors import InputError
+
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """Yield a temporary path with the same suffix that takes the place of ``path`` on success.
 
     On an exception the temporary file is removed and what stood at ``path`` stays as it was.
+
+    Raises:
+        InputError: for a path that is a folder's by its name (``.``, ``/``).
     """
+    if not path.name:
+        raise InputError(f"'{path}' is a folder; give the name of a file to write")
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}{path.suffix}")
     try:

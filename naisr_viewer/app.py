@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import time
 from collections.abc import Sequence
@@ -82,6 +83,8 @@ def view(
         raise InputError(f"there is no file {path}; give the path of an atlas (.safetensors)")
     engine = start.make_engine(device)
     if measure is not None:
+        if settings or scan or screenshot or demo:
+            raise InputError("--measure times the window as it starts; leave out the other options")
         return start.measured(engine, path, pixels, measure, LOADED)
     card = engine.open(path) if settings or screenshot or demo else None
     first = start.First(path, card, parse_settings(card, settings or []) if card else {}, scan)
@@ -122,7 +125,8 @@ def parse_size(text: str) -> tuple[int, int]:
     Raises:
         InputError: when it is anything else.
     """
-    width, _, height = text.lower().partition("x")
-    if not (width.isdigit() and height.isdigit() and int(width) >= 640 and int(height) >= 480):
+    parts = re.fullmatch(r"([0-9]{3,5})x([0-9]{3,5})", text.lower())
+    width, height = map(int, parts.groups()) if parts else (0, 0)
+    if width < 640 or height < 480:
         raise InputError(f"--size {text} is not understood; write WIDTHxHEIGHT, at least 640x480")
-    return int(width), int(height)
+    return width, height

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from naisr_model.errors import InputError
 from naisr_model.files import replacing, sources_digest
 
 
@@ -36,6 +37,12 @@ def test_writing_leaves_the_mask_of_the_process_alone(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "umask", lambda mask: pytest.fail("other threads would write with this mask"))
     with replacing(tmp_path / "kept.txt") as temporary:
         temporary.write_text("new")
+
+
+@pytest.mark.parametrize("name", ["", ".", "/"])
+def test_a_folder_is_no_file_to_write(name):
+    with pytest.raises(InputError, match="is a folder; give the name of a file"), replacing(Path(name)):
+        pytest.fail("nothing can be written there")
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there are no such permissions")

@@ -62,9 +62,16 @@ def test_a_bad_setting_is_explained(card, setting, complaint):
 
 def test_sizes():
     assert app.parse_size("2560x1440") == (2560, 1440)
-    for bad in ("big", "100x100", "1280", "1280x"):
+    for bad in ("big", "100x100", "1280", "1280x", "1²80x800", "-1280x800", "1280x800x2"):
         with pytest.raises(InputError, match="WIDTHxHEIGHT"):
             app.parse_size(bad)
+
+
+def test_a_measurement_takes_no_other_task(capsys, atlas_file, tmp_path):
+    wanted, picture = tmp_path / "m.json", tmp_path / "c.png"
+    assert app.main([str(atlas_file), "--measure", str(wanted), "--screenshot", str(picture)]) == 2
+    assert "leave out the other options" in capsys.readouterr().err
+    assert not wanted.exists() and not picture.exists()
 
 
 def test_a_missing_file_is_one_sentence_and_code_2(capsys, tmp_path):
