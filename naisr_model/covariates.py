@@ -259,7 +259,7 @@ def complete(
         if not extrapolate and not covariate.contains(value):
             raise InputError(
                 f"covariate '{covariate.name}' is {value:g} {covariate.unit}; the atlas was trained on "
-                f"{low:g} to {high:g}; pass --extrapolate (extrapolate=True in Python) to go on"
+                f"{low:g} to {high:g}; give a value within that"
             )
     return {c.name: float(values.get(c.name, c.centre)) for c in covariates}
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -194,6 +195,25 @@ def test_what_a_command_cannot_use_gets_a_sentence(egg_atlas, patient, words, me
     given = [str(patient) if word == "PATIENT" else word for word in words]
     assert cli.main([*given, "--atlas", str(egg_atlas)]) == 2
     assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["fit", "PATIENT", "--known", "age=99"],
+        ["transfer", "PATIENT", "--to", "age=99"],
+        ["evolve", "PATIENT", "--to", "99", "--path", "only"],
+        ["evolve", "PATIENT", "--to", "99"],
+    ],
+)
+def test_a_refusal_recommends_no_option_that_the_command_lacks(egg_atlas, patient, words, capsys):
+    given = [str(patient) if word == "PATIENT" else word for word in words]
+    assert cli.main([*given, "--atlas", str(egg_atlas)]) == 2
+    said = capsys.readouterr().err
+    assert cli.main([words[0], "--help"]) == 0
+    there = capsys.readouterr().out
+    assert "give a value within that" in said
+    assert all(option in there for option in re.findall(r"--[a-z]+", said))
 
 
 @pytest.mark.parametrize(
