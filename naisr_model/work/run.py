@@ -114,7 +114,8 @@ def _run_in(
     progress: Progress = SILENT,
 ) -> Iterator[tuple[int, Result]]:
     try:
-        numbers = {pool.submit(function, job): number for number, job in enumerate(jobs)}
+        with _held_back():
+            numbers = {pool.submit(function, job): number for number, job in enumerate(jobs)}
         pending = set(numbers)
         while pending:
             progress.check()
@@ -128,6 +129,19 @@ def _run_in(
         raise InputError(
             "a worker process died, most likely for lack of memory; run again with fewer workers"
         ) from error
+
+
+@contextmanager
+def _held_back() -> Iterator[None]:
+    """Ctrl+C waits meanwhile, and for good in processes started here: it would kill them on their way."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _start_worker(wanted: Connection) -> None:

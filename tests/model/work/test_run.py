@@ -5,6 +5,8 @@ from __future__ import annotations
 import doctest
 import math
 import os
+import subprocess
+import sys
 import time
 from concurrent import futures
 
@@ -42,6 +44,29 @@ def test_a_worker_has_one_thread():
 def test_the_ctrl_c_of_a_terminal_is_left_to_the_parent():
     with processes(2) as work:
         assert in_order(work(eval, ["__import__('os').kill(__import__('os').getpid(), 2)", "3"])) == [None, 3]
+
+
+def test_the_ctrl_c_of_a_terminal_while_workers_start_is_the_parents_too():
+    """In a process group of its own, as a terminal gives one to a command."""
+    program = (
+        "import os, signal\n"
+        "from naisr_model.errors import Cancelled\n"
+        "from naisr_model.progress import Progress\n"
+        "from naisr_model.work.run import processes\n"
+        "came, calls = [], []\n"
+        "signal.signal(signal.SIGINT, lambda *_: came.append(1))\n"
+        "def unwanted():\n"
+        "    calls.append(1)\n"
+        "    if len(calls) == 2: os.killpg(0, signal.SIGINT)\n"
+        "    return len(calls) > 20\n"
+        "try:\n"
+        "    with processes(2) as work: print(sorted(work(abs, [-2, 3], Progress(is_unwanted=unwanted))))\n"
+        "except Cancelled: print('stopped')\n"
+        "print(came)"
+    )
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, start_new_session=True)
+    assert done.stderr == "" and done.stdout == "[(0, 2), (1, 3)]\n[1]\n"
 
 
 def test_a_result_is_there_before_the_other_jobs_are_done():
