@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
 from naisr_model.cli.console import bar, stoppable, write_json
 from naisr_model.cli.options import AtlasFile, JsonFile, pairs
 from naisr_model.errors import InputError
+
+if TYPE_CHECKING:
+    from naisr_model.covariates import Covariate, Values  # loads numpy, which '--help' does not need
 
 PatientFile = Annotated[
     Path, Parameter(help="a mesh, whole or in part, a label volume or a cloud of points.")
@@ -151,19 +154,32 @@ def _fitted(patient: Path, loaded: Any, reading: IntakeOptions) -> tuple[Any, An
 
 
 def _tell_fit(fitted: Any, alternatives: Sequence[Mapping[str, Any]]) -> None:
-    for covariate in fitted.individual.atlas.covariates:
-        name, interval = covariate.name, ""
-        if name in fitted.intervals:
-            low, high = (covariate.format(value) for value in fitted.intervals[name])
-            interval = f" ({low})" if low == high else f" ({low} to {high})"
-        print(f"{name}: {covariate.format(fitted.covariates[name])}{interval}")
+    covariates = fitted.individual.atlas.covariates
+    for covariate in covariates:
+        ends = fitted.intervals.get(covariate.name)
+        interval = "" if ends is None else f" ({_interval(covariate, *ends)})"
+        print(f"{covariate.name}: {covariate.format(fitted.covariates[covariate.name])}{interval}")
     for other in alternatives[1:]:
-        print(f"or, with a probability of {other['probability']:.0%}: {other['covariates']}")
+        share, values = 100 * other["probability"], _row(covariates, other["covariates"])
+        print(f"or, with a probability of {share:.0f} %: {values}")
     low, high = fitted.volume_interval_cm3
     print(f"volume: {fitted.volume_cm3:.1f} cm³ ({low:.1f} to {high:.1f})")
     print(f"residual: {fitted.residual_mm:.2f} mm, {fitted.seconds:.1f} s")
     for sentence in fitted.remarks:
         print(sentence)
+
+
+def _interval(covariate: Covariate, low: float, high: float) -> str:
+    """Of a binary covariate the levels that are possible: between them there is nothing."""
+    start, end = covariate.format(low), covariate.format(high)
+    if start == end:
+        return start
+    return f"{start} or {end}" if covariate.kind == "binary" else f"{start} to {end}"
+
+
+def _row(covariates: Iterable[Covariate], values: Values) -> str:
+    """As people write them: ``73.7 months, 21.1 kg, F``."""
+    return ", ".join(covariate.format(values[covariate.name]) for covariate in covariates)
 
 
 def _tell_series(
@@ -174,7 +190,7 @@ def _tell_series(
     with bar("measuring") as progress:
         records = write_series(out, people, progress=progress)
     for person, record in zip(people, records, strict=True):
-        where = ", ".join(c.format(person.covariates[c.name]) for c in person.atlas.covariates)
+        where = _row(person.atlas.covariates, person.covariates)
         low, high = record["volume_low_cm3"], record["volume_high_cm3"]
         print(f"{where}: {record['volume_cm3']:.1f} cm³ ({low:.1f} to {high:.1f})")
     print(f"at other covariates {fitted.lasting:.0%} of what sets the patient apart is kept")

@@ -12,7 +12,7 @@ import trimesh
 from eggs import egg, label_volume, saved, turned
 
 from naisr_model import cli
-from naisr_model.atlas import Atlas
+from naisr_model.atlas import Alternative, Atlas, Fit
 
 KNOWN = ["--known", "age=6,sex=M"]
 TRUE_CM3 = egg(6.0, 1.0).volume / 1000
@@ -166,6 +166,16 @@ def test_the_command_tells_what_python_tells(egg_atlas, patient, tmp_path, capsy
     assert record["lasting"] == fit.lasting
     assert record["volume_interval_cm3"][0] < record["volume_cm3"] < record["volume_interval_cm3"][1]
     assert f"volume: {record['volume_cm3']:.1f} cm³" in said and "residual:" in said
+
+
+def test_the_report_of_a_fit_reads_as_people_write(egg_atlas, patient, monkeypatch, capsys):
+    told = Alternative({"age": 3.98765, "sex": -1.0}, 0.42)
+    monkeypatch.setattr(Fit, "alternatives", (told, told))
+    monkeypatch.setattr(Fit, "intervals", {"age": (3.0, 5.5), "sex": (-1.0, 1.0)})
+    assert cli.main(["fit", str(patient), "--atlas", str(egg_atlas)]) == 0
+    said = capsys.readouterr().out
+    assert "(3 years to 5.5 years)" in said and "(F or M)" in said
+    assert "or, with a probability of 42 %: 3.988 years, F\n" in said
 
 
 def test_transfer_and_evolve_write_shapes_and_tables(egg_atlas, patient, tmp_path, capsys):
