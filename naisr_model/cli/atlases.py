@@ -63,6 +63,7 @@ def mesh(
         device: where the networks are evaluated: cpu, cuda or mps.
     """
     from naisr_model.atlas import Atlas
+    from naisr_model.covariates import require_known
 
     if out.suffix.lower() not in (".stl", ".ply", ".obj", ".glb"):
         raise InputError(f"cannot write '{out.suffix}'; name the file .stl, .ply, .obj or .glb")
@@ -79,6 +80,7 @@ def mesh(
     elif effect is not None:
         if not loaded.capabilities.disentangleable:
             raise InputError(f"{loaded.model_title} does not tell covariates apart; leave out --effect")
+        require_known([effect], loaded.covariates)
         if values.keys() != {effect}:
             raise InputError(f"--effect {effect} needs its value and no other, as --set {effect}=VALUE")
         surface = loaded.effect(effect, values[effect], None, resolution, extrapolate=extrapolate)
