@@ -56,6 +56,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print_error=False,
         )
     except (InputError, CycloptsError) as error:
+        for note in getattr(error, "__notes__", ()):
+            print(note, file=sys.stderr)
         print(f"naisr: {error}", file=sys.stderr)
         return 2
     except OSError as error:

@@ -62,9 +62,9 @@ def prepare(
     with bar("preparing") as progress:
         report = run(table, out, options=options, progress=progress)
     for remark in report.rejected:
-        print(f"rejected {remark.path} (row {remark.row}): {remark.reason}")
+        print(f"rejected {remark}")
     for remark in report.warnings:
-        print(f"warning {remark.path} (row {remark.row}): {remark.reason}")
+        print(f"warning {remark}")
     print(
         f"{len(report.accepted)} shapes in {out} ({len(report.skipped)} were there already), "
         f"{len(report.rejected)} rejected"

@@ -11,7 +11,8 @@ import hashlib
 import json
 import re
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -62,6 +63,9 @@ class Remark(NamedTuple):
     path: str
     reason: str
 
+    def __str__(self) -> str:
+        return f"{self.path} (row {self.row}): {self.reason}"
+
 
 @dataclass(frozen=True)
 class PreparationReport:
@@ -106,7 +110,8 @@ def prepare(
         Which rows were used; also written to ``report.json`` in the store.
 
     Raises:
-        InputError: when the table, the options or ``out`` cannot be used, or no mesh can.
+        InputError: when the table, the options or ``out`` cannot be used, or no mesh can; with a note for
+            each row that was rejected until then, since that may be why.
         Cancelled: when nobody waits any more.
     """
     options, out = options or PrepareOptions(), Path(out)
@@ -116,14 +121,17 @@ def prepare(
         held_out = held_out_mask([row.subject for row in table.rows], options.held_out, options.seed)
         looks = [(row, table.alignment.method) for row in table.rows]
         inputs = in_order(run(inspect, looks, progress.part(0.0, 0.05)))
-        alignment = _reference(table, inputs, held_out)
+        with _telling_rejected(table, inputs):
+            alignment = _reference(table, inputs, held_out)
         places = [(alignment, row.mesh, item) for row, item in zip(table.rows, inputs, strict=True)]
         placed = in_order(run(place, places, progress.part(0.05, 0.1)))
-        usable = _usable(table, placed)
-        population = tables.population_from_table(table.take(usable), held_out[usable])
-        frame = _common_frame([placed[i] for i in usable])
-        jobs = [_sampling(inputs[i].digest, placed[i], table.rows[i], frame, options, out) for i in usable]
-        written = in_order(run(write_samples, jobs, progress.part(0.1, 1.0)))
+        with _telling_rejected(table, placed):
+            usable = _usable(table, placed)
+            population = tables.population_from_table(table.take(usable), held_out[usable])
+            frame = _common_frame([placed[i] for i in usable])
+            sources = [(inputs[i].digest, placed[i], table.rows[i]) for i in usable]
+            jobs = [_sampling(*source, frame, options, out) for source in sources]
+            written = in_order(run(write_samples, jobs, progress.part(0.1, 1.0)))
     folders = [job.target.name for job in jobs]
     store.write_index(
         out,
@@ -166,17 +174,31 @@ def _report(
     table: ShapeTable, inputs: Sequence[Look], placed: Sequence[Placed], written: dict[int, bool]
 ) -> PreparationReport:
     """Sum up; ``written`` tells of each usable row whether this run sampled it."""
-
-    def remarks(reasons: Sequence[str]) -> tuple[Remark, ...]:
-        rows = zip(table.rows, reasons, strict=True)
-        return tuple(Remark(row.number, str(row.mesh), reason) for row, reason in rows if reason)
-
     return PreparationReport(
         accepted=tuple(table.rows[i].number for i in written),
         skipped=tuple(table.rows[i].number for i, new in written.items() if not new),
-        rejected=remarks([item.reason for item in placed]),
-        warnings=remarks(["; ".join(inputs[i].warnings) if i in written else "" for i in range(len(inputs))]),
+        rejected=_remarks(table, [item.reason for item in placed]),
+        warnings=_remarks(
+            table, ["; ".join(look.warnings) if i in written else "" for i, look in enumerate(inputs)]
+        ),
     )
+
+
+def _remarks(table: ShapeTable, reasons: Sequence[str]) -> tuple[Remark, ...]:
+    """On the rows that have a reason."""
+    rows = zip(table.rows, reasons, strict=True)
+    return tuple(Remark(row.number, str(row.mesh), reason) for row, reason in rows if reason)
+
+
+@contextmanager
+def _telling_rejected(table: ShapeTable, items: Sequence[Look | Placed]) -> Iterator[None]:
+    """An error that follows from what is left of the table has a note for each row that is not."""
+    try:
+        yield
+    except InputError as error:
+        for remark in _remarks(table, [item.reason for item in items]):
+            error.add_note(f"rejected {remark}")
+        raise
 
 
 # --- what lies between the stages ---------------------------------------------------------------

@@ -92,6 +92,17 @@ def test_bad_input_gets_one_sentence_and_exit_code_2(
     assert not list(tmp_path.iterdir())
 
 
+def test_who_was_rejected_is_told_also_when_the_others_are_of_no_use(naisr, egg_table, tmp_path):
+    """Of two ages one is left, because the mesh of the other is missing."""
+    table = tmp_path / "two.csv"
+    meshes = [egg_table.parent / "egg0.stl", egg_table.parent / "egg2.stl", "gone.stl"]
+    rows = [f"{mesh},{mesh},1,{age}" for mesh, age in zip(meshes, (3, 3, 4), strict=True)]
+    table.write_text("\n".join(["mesh,subject,visit,age [years]", *rows]) + "\n")
+    code, _, error = naisr("prepare", table, "--out", tmp_path / "out", "--held-out", 0, "--workers", 1)
+    assert code == 2 and "covariate 'age' does not vary" in error
+    assert "rejected " in error and "gone.stl (row 4): " in error
+
+
 @pytest.mark.parametrize("word", ["--help", "--version"])
 def test_help_is_there_without_heavy_imports(word):
     probe = (
