@@ -193,5 +193,5 @@ def _tell_series(
         where = _row(person.atlas.covariates, person.covariates)
         low, high = record["volume_low_cm3"], record["volume_high_cm3"]
         print(f"{where}: {record['volume_cm3']:.1f} cm³ ({low:.1f} to {high:.1f})")
-    print(f"at other covariates {fitted.lasting:.0%} of what sets the patient apart is kept")
+    print(f"at other covariates {100 * fitted.lasting:.0f} % of what sets the patient apart is kept")
     write_json(json_file, {"patient": intake.to_json(), "lasting": fitted.lasting, "shapes": records})

@@ -209,7 +209,9 @@ def check_mesh(mesh: trimesh.Trimesh) -> tuple[str, ...]:
     vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
     bulk = _bulk(vertices, faces, np.zeros(len(faces), dtype=np.int64))
     if bulk.opening[0] > OPEN_SHARE:
-        raise InputError(f"the surface is open (opening {bulk.opening[0]:.0%} of its area); close its holes")
+        raise InputError(
+            f"the surface is open (opening {100 * bulk.opening[0]:.0f} % of its area); close its holes"
+        )
     if bulk.volume[0] < FLAT_SHARE * bulk.area[0] ** 1.5 / (6 * np.sqrt(np.pi)):
         raise InputError("the surface encloses no volume; it must bound a body")
     return _oddities(faces)

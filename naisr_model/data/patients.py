@@ -171,7 +171,7 @@ def _label_remarks(
 ) -> tuple[str, ...]:
     lost = abs(surface.volume) / 1000 / size_cm3 - 1
     edge = "the label reaches the edge of the image and is cut off there; what lies beyond is not seen"
-    thin = f"parts are only a few voxels wide: the surface holds {lost:+.0%} of the voxels' volume"
+    thin = f"parts are only a few voxels wide: the surface holds {100 * lost:+.0f} % of the voxels' volume"
     applies = {edge: volumes.touches_edge(volume, label), thin: abs(lost) > _FEW_VOXELS}
     return tuple(sentence for sentence, true in applies.items() if true)
 
@@ -330,7 +330,9 @@ def _position(patient: PatientShape, frame: Frame) -> Finding | None:
     outside = float((np.abs(points).max(axis=1) > 1).mean())
     if not outside:
         return None
-    return Finding("warning", "outside", f"{outside:.0%} of the shape lies outside the atlas's box", remedy)
+    return Finding(
+        "warning", "outside", f"{100 * outside:.0f} % of the shape lies outside the atlas's box", remedy
+    )
 
 
 def _space(patient: PatientShape) -> Finding | None:
@@ -351,7 +353,7 @@ def _inverted(patient: PatientShape) -> Finding | None:
     share = float((np.asarray(turned.faces) != patient.mesh_mm.faces).any(axis=1).mean())
     if not share:
         return None
-    sentence = f"{share:.0%} of the faces look inward, so the volume is wrong or negative"
+    sentence = f"{100 * share:.0f} % of the faces look inward, so the volume is wrong or negative"
     return Finding("error", "inverted", sentence, "turn them round", flipped)
 
 
@@ -374,7 +376,7 @@ def _components(patient: PatientShape) -> Finding | None:
     if len(areas) < 2:
         return None
     largest = areas.max() / areas.sum()
-    sentence = f"the surface has {len(areas)} components; the largest has {largest:.1%} of the area"
+    sentence = f"the surface has {len(areas)} components; the largest has {100 * largest:.1f} % of the area"
     remedy = "keep the largest, or go on if they all belong to the shape"
     return Finding("warning", "components", sentence, remedy, largest_component)
 
@@ -390,7 +392,7 @@ def _opening(patient: PatientShape) -> Finding | None:
         return None
     share = holes.sum() / (holes.sum() + patient.mesh_mm.area)
     count = "a hole" if len(holes) == 1 else f"{len(holes)} holes"
-    sentence = f"the surface is open: {count} of {share:.1%} of its area"
+    sentence = f"the surface is open: {count} of {100 * share:.1f} % of its area"
     remedy = "close it if the shape is whole; else it is fitted as a part, and the volume is the model's"
     return Finding("warning", "open", sentence, remedy)
 

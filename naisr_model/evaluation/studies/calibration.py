@@ -140,9 +140,9 @@ def _summary(rows: list[list[float]], unit: str, kind: str) -> dict[str, Any]:
 def _markdown_row(name: str, row: Mapping[str, Any]) -> str:
     low, high = AGREED
     if "wrong" in row:
-        cells = [f"{row['undecided']:.0%} undecided", f"{row['wrong']:.0%} wrong"]
+        cells = [f"{100 * row['undecided']:.0f} % undecided", f"{100 * row['wrong']:.0f} % wrong"]
         agreed = low <= row["coverage"]
     else:
         cells = [f"{row['width']:.3g} {row['unit']}", f"{row['error']:.3g} {row['unit']}"]
         agreed = low <= row["coverage"] <= high
-    return f"| {name} | {row['coverage']:.1%} | {' | '.join(cells)} | {'yes' if agreed else 'no'} |"
+    return f"| {name} | {100 * row['coverage']:.1f} % | {' | '.join(cells)} | {'yes' if agreed else 'no'} |"

@@ -159,7 +159,7 @@ class Completion:
         for cut, title in CUTS.items():
             for way, label in WAYS.items():
                 record = report[cut][way]
-                held = "–" if record["held"] is None else f"{record['held']:.0%}"
+                held = "–" if record["held"] is None else f"{100 * record['held']:.0f} %"
                 rows.append([f"{title}, {label}", *(pair_cell(record[name]) for name in COLUMNS), held])
         table = markdown_table(["", *COLUMNS.values(), "volume inside its 95 % interval"], rows)
         notes = "\n".join(f"- {text}." for text in report["definitions"])

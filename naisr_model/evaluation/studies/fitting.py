@@ -117,7 +117,7 @@ class Fitting:
             for way, label in labels.items()
         ]
         table = markdown_table(["", "held-out residual, mm", "seconds a shape"], rows)
-        told = f"Equal or lower residual on {report['no_worse']:.0%} of the shapes"
+        told = f"Equal or lower residual on {100 * report['no_worse']:.0f} % of the shapes"
         title = f"**{report['n']} held-out shapes, covariates known**"
         return f"{title}\n\n{table}\n\n{told}, {report['times_faster']:.0f} times faster."
 

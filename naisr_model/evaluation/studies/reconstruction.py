@@ -244,7 +244,7 @@ def _truth_table(title: str, places: Sequence[Mapping[str, Any]]) -> str:
             place["condition"],
             f"{place['volume_cm3']:.2f}",
             f"{place['truth_cm3']:.2f}",
-            f"{place['volume_error']:+.1%}",
+            f"{100 * place['volume_error']:+.1f} %",
             f"{place['hd_x100']:.2f}",
         ]
         for place in places
@@ -258,7 +258,7 @@ def _checks(report: Mapping[str, Any]) -> str:
         f"Connected components: {least} to {most} (1 everywhere means no ghosts).",
     ]
     if report["folded_share"] is not None:
-        sentences.append(f"Folded points near the surface: {report['folded_share']:.2%}.")
+        sentences.append(f"Folded points near the surface: {100 * report['folded_share']:.2f} %.")
     if report["without_surface"]:
         sentences.append(f"Fits without any surface: {report['without_surface']}.")
     if report["corner_components"]:
@@ -267,7 +267,7 @@ def _checks(report: Mapping[str, Any]) -> str:
     if template := report["template"]:
         sentences.append(
             f"Template: {template['volume_cm3']:.2f} cm³, true at the centre {template['truth_cm3']:.2f} cm³ "
-            f"({template['volume_error']:+.1%}), HD x10² {template['hd_x100']:.2f}."
+            f"({100 * template['volume_error']:+.1f} %), HD x10² {template['hd_x100']:.2f}."
         )
     if shifts := report["mean_displacement_mm"]:
         listed = ", ".join(f"{name} {shift:.2f} mm" for name, shift in shifts.items())

@@ -278,7 +278,7 @@ def _interval(record: Mapping[str, Any]) -> tuple[str, str]:
     if record["held"] is None:
         return "–", "–"
     width = record["width_cm3"]
-    return f"{record['held']:.0%}", f"{width:,.0f}" if width > 100 else f"{width:.3g}"
+    return f"{100 * record['held']:.0f} %", f"{width:,.0f}" if width > 100 else f"{width:.3g}"
 
 
 def _patient_table(cases: Sequence[Mapping[str, Any]]) -> str:

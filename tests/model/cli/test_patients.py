@@ -183,7 +183,7 @@ def test_transfer_and_evolve_write_shapes_and_tables(egg_atlas, patient, tmp_pat
     assert cli.main(["transfer", *given, "--to", "age=8"]) == 0
     said = capsys.readouterr().out
     assert "8 years, M:" in said
-    assert "at other covariates 90% of what sets" in said  # nobody was seen twice
+    assert "at other covariates 90 % of what sets" in said  # nobody was seen twice
     assert len((tmp_path / "volumes.csv").read_text().splitlines()) == 3
     ways = ["--from", "3", "--to", "4", "--steps", "3", "--path", "only"]
     assert cli.main(["evolve", *given, *ways]) == 0

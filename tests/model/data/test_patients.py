@@ -220,7 +220,7 @@ def test_faces_that_look_inward_are_turned():
     inside_out = body()
     inside_out.invert()
     patient, (finding,), left = repaired(PatientShape(inside_out), FRAME)
-    assert finding.topic == "inverted" and "100% of the faces" in finding.sentence and left == ()
+    assert finding.topic == "inverted" and "100 % of the faces" in finding.sentence and left == ()
     assert patient.mesh_mm.volume == pytest.approx(body().volume)
 
 
@@ -244,7 +244,7 @@ def test_components_are_counted_and_the_largest_kept():
     (finding,) = check_patient(patient, FRAME)
     share = body().area / (body().area + crumb.area)
     assert (finding.kind, finding.topic) == ("warning", "components")
-    assert "2 components" in finding.sentence and f"{share:.1%}" in finding.sentence
+    assert "2 components" in finding.sentence and f"{100 * share:.1f} %" in finding.sentence
     assert repaired(patient, FRAME)[0] is patient
     kept = largest_component(patient)
     assert kept.mesh_mm.volume == pytest.approx(body().volume)
@@ -261,7 +261,7 @@ def test_holes_are_measured():
     tube = tube.subdivide_to_size(20.0)
     (finding,) = check_patient(PatientShape(tube), FRAME)
     assert (finding.kind, finding.topic) == ("warning", "open")
-    assert f"2 holes of {2 * cap_mm2 / (2 * cap_mm2 + tube.area):.1%}" in finding.sentence
+    assert f"2 holes of {200 * cap_mm2 / (2 * cap_mm2 + tube.area):.1f} %" in finding.sentence
     assert not len(hole_areas_mm2(body()))
 
 

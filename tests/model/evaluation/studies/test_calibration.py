@@ -34,9 +34,9 @@ def test_it_is_told_in_a_table(egg_atlas):
     rows = {"volume": volume, "age": volume | {"coverage": 1.0}}
     rows["sex"] = {"coverage": 1.0, "undecided": 0.6, "wrong": 0.4}
     text = Calibration(egg_atlas).markdown({"n": 7, "known": [], "rows": rows})
-    assert "7 new patients" in text and "| volume | 95.0% | 2 cm³ | 0.5 cm³ | yes |" in text
-    assert "| age | 100.0% | 2 cm³ | 0.5 cm³ | no |" in text
-    assert "| sex | 100.0% | 60% undecided | 40% wrong | yes |" in text
+    assert "7 new patients" in text and "| volume | 95.0 % | 2 cm³ | 0.5 cm³ | yes |" in text
+    assert "| age | 100.0 % | 2 cm³ | 0.5 cm³ | no |" in text
+    assert "| sex | 100.0 % | 60 % undecided | 40 % wrong | yes |" in text
 
 
 def test_what_makes_no_sense_is_refused(egg_people, egg_atlas):

@@ -108,7 +108,7 @@ def test_no_surface_at_all_is_said_in_words() -> None:
 
 def test_the_table_shows_values_units_definitions_and_the_published_rows() -> None:
     text = AIRWAY.markdown(report())
-    assert "0.03 / 0.02" in text and "VD, cm³" in text and "-10.0%" in text
+    assert "0.03 / 0.02" in text and "VD, cm³" in text and "-10.0 %" in text
     assert "mean squared nearest-neighbour" in text
     published = [line for line in text.splitlines() if line.startswith("| published")]
     assert len(published) == 2 and "0.084 / 0.044" in published[0]
