@@ -216,7 +216,7 @@ class Atlas:
         tracker: Tracker | None = None,
         progress: Progress = SILENT,
     ) -> trimesh.Trimesh:
-        """The disentangled shape of one covariate, Phi_i(p, c_i, z): Phi with the others at their centre.
+        """The effect of one covariate, Phi_i(p, c_i, z): Phi with the others at their centre.
 
         The displacements of several covariates add at one query point; these surfaces do not. A
         ``tracker`` of this atlas and code makes it several times faster; the surface is the same.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from cyclopts import App, CycloptsError
+from cyclopts import App, CycloptsError, Parameter
 
 from naisr_model import __version__
 from naisr_model.cli import atlases, benchmarking, data, patients
@@ -27,6 +27,7 @@ app = App(
     name="naisr",
     version=__version__,
     help="Shape atlases that explain: prepare data, train, inspect, evaluate and export.",
+    default_parameter=Parameter(negative=()),
 )
 for _command in COMMANDS:
     app.command(_command)

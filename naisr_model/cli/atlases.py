@@ -43,7 +43,7 @@ def mesh(
     atlas: Path,
     out: Path,
     *,
-    set: Annotated[list[str] | None, Parameter(name="--set", negative=())] = None,
+    set: Annotated[list[str] | None, Parameter(name="--set")] = None,
     effect: str | None = None,
     template: bool = False,
     resolution: int = 128,
@@ -56,7 +56,7 @@ def mesh(
         atlas: the .safetensors file.
         out: the mesh to write.
         set: a covariate's value in real units, as age=120; the others are at the population centre.
-        effect: the covariate whose disentangled shape is wanted instead of the full shape.
+        effect: the covariate whose effect is wanted instead of the full shape.
         template: write the template.
         resolution: cells along a side of the box, a multiple of 8.
         extrapolate: allow values outside the observed range.

@@ -21,9 +21,7 @@ def bench(
     json_file: JsonFile = None,
     quick: Annotated[
         bool,
-        Parameter(
-            negative=(), help="see in less than a minute that everything runs; the figures then say little."
-        ),
+        Parameter(help="see in less than a minute that everything runs; the figures then say little."),
     ] = False,
     device: Annotated[
         str, Parameter(help="where networks are evaluated and trained: cpu, cuda or mps.")

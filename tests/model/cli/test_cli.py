@@ -8,6 +8,7 @@ import trimesh
 from eggs import egg
 
 from naisr_model import cli
+from naisr_model.evaluation.studies import STUDIES
 from naisr_model.models.factory import presets
 
 SETTINGS = """
@@ -122,6 +123,16 @@ def test_the_help_of_populate_names_every_population():
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert "airway or bodies or pears." in " ".join(done.stdout.replace("\u2502", " ").split())
+
+
+def test_a_switch_is_there_to_be_turned_on(naisr):
+    for command in (
+        *(["populate"], ["prepare"], ["train"], ["fit"], ["transfer"], ["evolve"], ["info"], ["mesh"]),
+        *(["bench"], *(["evaluate", study] for study in STUDIES)),
+    ):
+        code, said, _ = naisr(*command, "--help")
+        assert code == 0 and "--no-" not in said and "--empty-" not in said
+    assert "--template" in naisr("mesh", "--help")[1]
 
 
 def test_the_package_runs_as_a_module():
