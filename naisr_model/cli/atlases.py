@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
@@ -12,31 +13,68 @@ from naisr_model.cli.options import AtlasFile, covariate_values
 from naisr_model.errors import InputError
 from naisr_model.files import replacing
 
+if TYPE_CHECKING:
+    from naisr_model.covariates import Covariate, Population  # loads numpy, which '--help' does not need
+
+
+CAN = {
+    "implicit": "surfaces at any resolution",
+    "deformable": "points of different shapes correspond",
+    "disentangleable": "the effect of each covariate alone can be seen",
+    "evolvable": "shapes can be followed along covariates",
+    "transferable": "a patient can be seen on another day",
+    "invertible": "deformations cannot fold",
+    "has_template": "there is a template that all shapes are deformed from",
+    "vanishes_at_centre": "at the centre of the covariates every shape is the template",
+}
+"""What each capability means to whoever uses an atlas."""
+
+TRAINED: dict[str, Callable[[float], str]] = {
+    "iterations": "{:,} iterations".format,
+    "seconds": lambda seconds: f"{seconds / 60:.1f} minutes",
+    "folded_share": lambda share: f"folded points near the surface {100 * share:.2f} %",
+}
+"""How the figures of a training read."""
+
 
 def info(atlas: AtlasFile) -> None:
     """Show what an atlas is made of."""
     from naisr_model.checkpoint import load
 
     checkpoint = load(atlas)
-    population = checkpoint.population
-    held_out = int(population.held_out.sum())
-    weights = sum(tensor.numel() for tensor in checkpoint.weights.values())
     model = checkpoint.model()
-    abilities = [
-        name.replace("_", " ") for name, can in dataclasses.asdict(model.capabilities).items() if can
-    ]
-    print(
-        f"{checkpoint.name}: {len(population)} shapes of {len(set(population.subjects))} subjects, ", end=""
-    )
-    print(f"{held_out} shapes held out")
-    for covariate in population.covariates:
-        low, high = (covariate.format(value) for value in covariate.range)
-        print(f"  {covariate.name}: {low} to {high}, centre {covariate.format(covariate.centre)}")
-    print(f"model: {model.title}: {', '.join(abilities)}")
+    weights = sum(tensor.numel() for tensor in checkpoint.weights.values())
+    print(f"{checkpoint.name}: trained on {_counted(checkpoint.population, held_out=False)}; ", end="")
+    print(f"{_counted(checkpoint.population, held_out=True)} held out")
+    for covariate in model.relevant(checkpoint.population).covariates:
+        print(f"  {_extent(covariate)}")
+    if not model.capabilities.evolvable:
+        print("  its shapes depend on no covariates")
+    print(f"model: {model.title}")
+    for name, can in dataclasses.asdict(model.capabilities).items():
+        if can:
+            print(f"  {CAN[name]}")
     print(f"networks: {weights:,} weights, latent code of {checkpoint.preset.network.latent}")
     print(f"box: {2 * checkpoint.frame.scale_mm:.0f} mm wide, alignment by {checkpoint.alignment.method}")
-    for key, value in {**checkpoint.source, **checkpoint.training}.items():
-        print(f"{key}: {value}")
+    if checkpoint.source:
+        print(f"source: {', '.join(f'{key} {value}' for key, value in checkpoint.source.items())}")
+    told = [say(checkpoint.training[key]) for key, say in TRAINED.items() if key in checkpoint.training]
+    print(f"training: {', '.join(told)}")
+
+
+def _counted(population: Population, *, held_out: bool) -> str:
+    """``277 shapes of 204 subjects``."""
+    chosen = population.held_out == held_out
+    subjects = {subject for subject, is_one in zip(population.subjects, chosen, strict=True) if is_one}
+    return f"{int(chosen.sum())} shapes of {len(subjects)} subjects"
+
+
+def _extent(covariate: Covariate) -> str:
+    """What was observed of a covariate; a binary one has nothing between its levels."""
+    if covariate.kind == "binary":
+        return f"{covariate.name}: {' or '.join(covariate.levels)}"
+    low, high = (covariate.format(value) for value in covariate.range)
+    return f"{covariate.name}: {low} to {high}, centre {covariate.format(covariate.centre)}"
 
 
 def mesh(

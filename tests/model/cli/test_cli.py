@@ -1,5 +1,6 @@
 """The command line as a user types it: a CSV and a folder of STL files become an atlas and a mesh."""
 
+import dataclasses
 import subprocess
 import sys
 
@@ -8,6 +9,8 @@ import trimesh
 from eggs import egg
 
 from naisr_model import cli
+from naisr_model.capabilities import Capabilities
+from naisr_model.cli.atlases import CAN
 from naisr_model.evaluation.studies import STUDIES
 from naisr_model.models.factory import presets
 
@@ -47,8 +50,10 @@ def test_from_a_table_of_stl_files_to_a_mesh(naisr, egg_table, tmp_path):
     )
     assert code == 0 and "after 4 iterations" in out and "folded points" in out
     code, out, _ = naisr("info", atlas)
-    assert code == 0 and "age: 1 years to" in out and "24 shapes of 24 subjects" in out
-    assert "model: NAISR: implicit, deformable, disentangleable, evolvable, transferable" in out
+    assert code == 0 and "age: 1 years to" in out and "sex: F or M\n" in out
+    assert "trained on 19 shapes of 19 subjects; 5 shapes of 5 subjects held out" in out
+    assert "model: NAISR\n" in out and "  a patient can be seen on another day\n" in out
+    assert "training: 4 iterations, 0.0 minutes, folded points near the surface " in out
 
 
 def test_a_mesh_of_the_atlas_is_written_in_millimetres(naisr, egg_atlas, tmp_path):
@@ -146,7 +151,14 @@ def test_a_model_without_covariates_makes_its_average(naisr, egg_deepsdf, tmp_pa
     assert naisr("mesh", egg_deepsdf, tmp_path / "mean.stl", "--resolution", 32)[0] == 0
     assert trimesh.load_mesh(tmp_path / "mean.stl").is_watertight
     _, out, _ = naisr("info", egg_deepsdf)
-    assert "model: DeepSDF: implicit\n" in out
+    assert (
+        "  its shapes depend on no covariates\nmodel: DeepSDF\n  surfaces at any resolution\nnetworks" in out
+    )
+    assert "age" not in out and "seconds:" not in out
+
+
+def test_info_has_words_for_every_capability():
+    assert list(CAN) == [field.name for field in dataclasses.fields(Capabilities)]
 
 
 def test_the_help_of_train_names_the_presets_of_every_model(naisr):
