@@ -24,9 +24,9 @@ _console = Console(stderr=True)
 def bar(label: str) -> Iterator[Progress]:
     """A bar that shows the progress it hands out, which Ctrl+C stops."""
     columns = TextColumn(label), BarColumn(), TextColumn("{task.percentage:.0f} %"), TimeRemainingColumn()
-    with Bar(*columns, console=_console) as shown, stoppable() as silent:
+    with _drawn(Bar(*columns, console=_console)) as (shown, progress):
         task = shown.add_task(label, total=1.0)
-        yield replace(silent, told=lambda share: shown.update(task, completed=share))
+        yield replace(progress, told=lambda share: shown.update(task, completed=share))
 
 
 @contextlib.contextmanager
@@ -39,7 +39,7 @@ def training_bar() -> Iterator[tuple[Progress, Callable[[Any], None]]]:
             "loss {task.fields[loss]:.3f}  {task.fields[speed]:,.0f} points/s  {task.fields[left]} left"
         ),
     )
-    with Bar(*columns, console=_console) as shown, stoppable() as silent:
+    with _drawn(Bar(*columns, console=_console)) as (shown, progress):
         task = shown.add_task("training", total=1.0, epoch=0, loss=float("nan"), speed=0.0, left="?")
 
         def report(told: Any) -> None:
@@ -53,7 +53,23 @@ def training_bar() -> Iterator[tuple[Progress, Callable[[Any], None]]]:
                 left=f"{minutes}:{seconds:02d}",
             )
 
-        yield silent, report
+        yield progress, report
+
+
+@contextlib.contextmanager
+def _drawn(shown: Bar) -> Iterator[tuple[Bar, Progress]]:
+    """A bar from the first time on that the work asks whether to go on: before, its input is checked."""
+
+    def is_unwanted() -> bool:
+        shown.start()
+        return silent.is_unwanted()
+
+    with stoppable() as silent:
+        try:
+            yield shown, replace(silent, is_unwanted=is_unwanted)
+        finally:
+            if shown.live.is_started:
+                shown.stop()
 
 
 @contextlib.contextmanager

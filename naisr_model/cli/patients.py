@@ -144,6 +144,7 @@ def _fitted(patient: Path, loaded: Any, reading: IntakeOptions) -> tuple[Any, An
 
     options = dataclasses.asdict(reading)
     known = parsed(loaded, pairs("--known", options.pop("known")))
+    loaded.complete(known)  # refused before a scan is read and repaired
     with stoppable() as progress:
         intake = take_in(patient, loaded, known, **options, progress=progress)
     for sentence in intake.sentences:

@@ -98,6 +98,33 @@ def test_bad_input_gets_one_sentence_and_exit_code_2(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["evaluate", "transfer", "DEEPSDF", "--store", "STORE"],
+        ["evaluate", "reconstruction", "ATLAS"],
+        ["evaluate", "reconstruction", "ATLAS", "--store", "STORE", "--journal", "STRANGE"],
+        ["bench", "DEEPSDF"],
+        ["fit", "EGG", "--atlas", "ATLAS", "--known", "age=900"],
+        ["train", "STORE", "--out", "NOWHERE"],
+        ["prepare", "nowhere.csv", "--out", "x"],
+        ["populate", "moon", "x"],
+    ],
+)
+def test_a_refusal_shows_no_bar(naisr, egg_atlas, egg_deepsdf, egg_store, egg_table, tmp_path, words):
+    strange = tmp_path / "strange.jsonl"
+    strange.write_text('{"study": "another"}\n')
+    there = {"ATLAS": egg_atlas, "DEEPSDF": egg_deepsdf, "STORE": egg_store.path, "STRANGE": strange}
+    there |= {"EGG": egg_table.parent / "egg0.stl", "NOWHERE": strange / "x.safetensors"}
+    code, _, error = naisr(*(there.get(word, word) for word in words))
+    assert code == 2 and error.startswith("naisr: ") and error.count("\n") == 1
+
+
+def test_a_bar_is_there_once_the_work_goes_on(naisr, tmp_path):
+    code, _, error = naisr("populate", "bodies", tmp_path / "people", "--patients", 2)
+    assert code == 0 and "writing bodies" in error and "100 %" in error
+
+
 def test_who_was_rejected_is_told_also_when_the_others_are_of_no_use(naisr, egg_table, tmp_path):
     """Of two ages one is left, because the mesh of the other is missing."""
     table = tmp_path / "two.csv"
