@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 from cyclopts import App, CycloptsError, Parameter
 
@@ -50,12 +52,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0 on success, 2 for input that cannot be used, 130 when stopped by the user.
     """
     try:
-        app(
-            sys.argv[1:] if arguments is None else arguments,
-            result_action="return_value",
-            exit_on_error=False,
-            print_error=False,
-        )
+        with _interrupts():
+            app(
+                sys.argv[1:] if arguments is None else arguments,
+                result_action="return_value",
+                exit_on_error=False,
+                print_error=False,
+            )
     except (InputError, CycloptsError) as error:
         for note in getattr(error, "__notes__", ()):
             print(note, file=sys.stderr)
@@ -68,3 +71,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("naisr: stopped; what was finished is kept", file=sys.stderr)
         return 130
     return 0
+
+
+@contextmanager
+def _interrupts() -> Iterator[None]:
+    """Ctrl+C stays what it is: a library that is loaded just then may make a mistake of its own of it.
+
+    Raises:
+        KeyboardInterrupt: in the place of whatever came of one.
+    """
+    came: list[int] = []
+
+    def interrupt(number: int, _frame: object) -> None:
+        came.append(number)
+        raise KeyboardInterrupt
+
+    previous = signal.signal(signal.SIGINT, interrupt)
+    try:
+        yield
+    except Exception as error:
+        if came:
+            raise KeyboardInterrupt from error
+        raise
+    finally:
+        signal.signal(signal.SIGINT, previous)

@@ -1,6 +1,7 @@
 """The command line as a user types it: a CSV and a folder of STL files become an atlas and a mesh."""
 
 import dataclasses
+import signal
 import subprocess
 import sys
 
@@ -123,6 +124,19 @@ def test_a_refusal_shows_no_bar(naisr, egg_atlas, egg_deepsdf, egg_store, egg_ta
 def test_a_bar_is_there_once_the_work_goes_on(naisr, tmp_path):
     code, _, error = naisr("populate", "bodies", tmp_path / "people", "--patients", 2)
     assert code == 0 and "writing bodies" in error and "100 %" in error
+
+
+def test_ctrl_c_stops_also_where_a_library_swallows_it(naisr, egg_atlas, monkeypatch):
+    def swallowing(_path):
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except BaseException as error:
+            raise TypeError("not loaded") from error
+
+    before = signal.getsignal(signal.SIGINT)
+    monkeypatch.setattr("naisr_model.checkpoint.load", swallowing)
+    assert naisr("info", egg_atlas) == (130, "", "naisr: stopped; what was finished is kept\n")
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 def test_who_was_rejected_is_told_also_when_the_others_are_of_no_use(naisr, egg_table, tmp_path):
