@@ -124,7 +124,8 @@ def test_files_that_change_meanwhile_end_it(squares, tmp_path, workers, is_kept)
         run(study, workers=workers, journal=journal)
     if journal is not None:
         kept = [json.loads(line)["key"] for line in journal.read_text().splitlines()[1:]]
-        assert set(kept) <= {"number 3"}
+        # A second process may be done with others while the first is about to rewrite the file.
+        assert kept == ["number 3"] if workers == 1 else "number 2" not in kept
 
 
 def test_a_file_that_changes_between_the_start_and_the_cases_ends_it(squares):
