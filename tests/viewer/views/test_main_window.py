@@ -224,8 +224,8 @@ def test_the_export_dialog_is_filled_in_and_accepted(ready, qtbot, tmp_path: Pat
     press_keys(window, "Ctrl+E")
     qtbot.waitUntil(lambda: "Exported 1 surface" in window.status.text(), timeout=5000)
     assert {p.name for p in (tmp_path / "out").iterdir()} == {
-        "ellipsoid-age-only.glb",
-        "ellipsoid-age-only.json",
+        "ellipsoid-age-only_age100.glb",
+        "ellipsoid-age-only_age100.glb.json",
     }
     wait_idle(qtbot, controller)
     assert window.covariates.isEnabled()
