@@ -62,12 +62,12 @@ def processes(workers: int | None = None) -> Iterator[Run]:
     bear that.
 
     Args:
-        workers: how many; None for one a core, 1 to stay in this process.
+        workers: how many; None for one a core, as far as that goes, 1 to stay in this process.
 
     Raises:
         InputError: for fewer than one, or more than :data:`MOST_WORKERS`.
     """
-    count = cores() if workers is None else workers
+    count = min(cores(), MOST_WORKERS) if workers is None else workers
     if not 1 <= count <= MOST_WORKERS:
         raise InputError(f"the number of workers is {count}; give 1 to {MOST_WORKERS}")
     if count == 1:

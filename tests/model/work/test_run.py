@@ -126,5 +126,11 @@ def test_a_number_of_workers_that_makes_no_sense():
     assert cores() >= 1
 
 
+def test_a_machine_with_more_cores_than_there_can_be_workers(monkeypatch):
+    monkeypatch.setattr(run, "cores", lambda: 500)
+    with processes() as work:
+        assert in_order(work(abs, [-2])) == [2]
+
+
 def test_the_example_in_the_documentation():
     assert doctest.testmod(run).failed == 0
