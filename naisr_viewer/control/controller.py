@@ -104,12 +104,14 @@ class Controller(QObject):
             choice: what to write and where.
             replaces: whether files that are there already are replaced without a question.
         """
-        if self.state.atlas is None:
+        atlas = self.state.atlas
+        if atlas is None:
             return
-        others = [] if replaces else in_the_way(planned(self.state, choice))
+        plan = planned(self.state, choice)
+        others = [] if replaces else in_the_way(plan)
         if others and not self._window.ask_replace(others):
             return
-        job = jobs.exporting(self._engine, self.state, choice)
+        job = jobs.exporting(self._engine, atlas, plan, choice)
         told = f"Exporting into {choice.folder} …"
         self.refinement.run(told, job, lambda report: self.refinement.tell(report.sentence))
 

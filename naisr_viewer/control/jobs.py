@@ -10,10 +10,9 @@ from naisr_model.progress import Progress
 from naisr_viewer.control.worker import Deliver, Job
 from naisr_viewer.engine.clinic import Clinic
 from naisr_viewer.engine.engine import Engine
-from naisr_viewer.files.exports import planned
+from naisr_viewer.files.exports import Planned
 from naisr_viewer.files.surfaces import write_surface
 from naisr_viewer.state.atlas_card import AtlasCard
-from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.patients import Fitted, Labels, Named, Reading, Scan
 from naisr_viewer.state.requests import ExportChoice, SurfaceRequest, SurfaceResult
 
@@ -56,10 +55,10 @@ def one_by_one(engine: Engine, requests: Sequence[SurfaceRequest]) -> Job[Surfac
     return job
 
 
-def exporting(engine: Engine, state: ExplorerState, choice: ExportChoice) -> Job[ExportReport]:
-    """Writes surfaces at the values of ``state``, computing what is missing; hands over a report."""
-    atlas, plan = state.atlas, planned(state, choice)
-    assert atlas is not None
+def exporting(
+    engine: Engine, atlas: AtlasCard, plan: Sequence[Planned], choice: ExportChoice
+) -> Job[ExportReport]:
+    """Writes the surfaces of a plan, computing what is missing; hands over a report on what was chosen."""
 
     def job(deliver: Deliver[ExportReport], progress: Progress) -> None:
         for (request, path, owner), piece in progress.over(plan):
