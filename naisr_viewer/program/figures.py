@@ -17,7 +17,7 @@ from naisr_model.shipped import shipped_atlas
 from naisr_viewer.control.controller import Controller
 from naisr_viewer.program import start
 from naisr_viewer.program.display import ensure_display
-from naisr_viewer.program.headless import finish
+from naisr_viewer.program.headless import finish, take_screenshot
 from naisr_viewer.state.layouts import Layout
 from naisr_viewer.state.patients import Named, Reading
 from naisr_viewer.views.main_window import MainWindow
@@ -45,12 +45,12 @@ def main(folder: Path) -> None:
         window.resize(*PIXELS)
         window.show()
         controller.show_atlas(card, SHOWN)
-        _picture(window, controller, folder / "window.png")
+        take_screenshot(window, controller, folder / "window.png")
         _fit(window, controller, _child(Path(scans)))
         controller.set_follow(True)
         controller.set_layout(Layout.CHANGE)
         controller.settle("age", dict(controller.state.named)["age"] + LATER_MONTHS)
-        _picture(window, controller, folder / "patient.png")
+        take_screenshot(window, controller, folder / "patient.png")
 
 
 def _child(folder: Path) -> Child:
@@ -80,12 +80,6 @@ def _fit(window: MainWindow, controller: Controller, child: Child) -> None:
     window.patients.known.give(child.known)
     window.patients.known.fit.click()
     finish(window, controller)
-
-
-def _picture(window: MainWindow, controller: Controller, path: Path) -> None:
-    finish(window, controller)
-    controller.save_screenshot(path)
-    print(f"wrote {path}")
 
 
 if __name__ == "__main__":

@@ -53,14 +53,16 @@ def finish(window: MainWindow, controller: Controller) -> None:
         InputError: when the window reports an error instead.
     """
     wait_until(lambda: window.shapes.is_ready and not controller.is_busy)
-    if window.error_text.text():
-        raise InputError(window.error_text.text())
+    _require_no_error(window)
 
 
 def take_screenshot(window: MainWindow, controller: Controller, path: Path) -> None:
-    """Write a picture of the window once everything on it is exact."""
-    finish(window, controller)
-    controller.save_screenshot(path)
+    """Write a picture of the window once everything on it is exact, and say so.
+
+    Raises:
+        InputError: when the window reports an error instead.
+    """
+    _picture(window, controller, path)
     print(f"wrote {path}")
 
 
@@ -99,6 +101,12 @@ def run_demo(window: MainWindow, controller: Controller, folder: Path) -> None:
 def _picture(window: MainWindow, controller: Controller, path: Path) -> None:
     finish(window, controller)
     controller.save_screenshot(path)
+    _require_no_error(window)
+
+
+def _require_no_error(window: MainWindow) -> None:
+    if window.error_text.text():
+        raise InputError(window.error_text.text())
 
 
 def _export_moved(window: MainWindow, controller: Controller, folder: Path) -> Path:

@@ -139,6 +139,14 @@ def test_screenshot_and_demonstration_without_any_display(egg_atlas, tmp_path):
 
 
 @pytest.mark.skipif(shutil.which("Xvfb") is None, reason="needs a virtual display")
+def test_a_picture_that_cannot_be_written_is_not_said_to_be(egg_atlas, tmp_path):
+    arguments = [str(egg_atlas), "--screenshot", str(tmp_path / "picture.nonsense")]
+    done = run(f"import sys; from naisr_viewer import app; sys.exit(app.main({arguments!r}))", *DISPLAY)
+    assert done.returncode == 2 and "end its name with .png" in done.stderr
+    assert done.stdout == "" and list(tmp_path.rglob("*picture*")) == []
+
+
+@pytest.mark.skipif(shutil.which("Xvfb") is None, reason="needs a virtual display")
 def test_a_scan_is_opened_at_once(egg_atlas, tmp_path):
     scan = tmp_path / "p01.ply"
     egg(5.0, 1.0).export(scan)
