@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from naisr_viewer.panels.kinds import title_of
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.patients import OpenScan
 from naisr_viewer.state.requests import FORMATS, SurfaceResult
+
+if TYPE_CHECKING:
+    import trimesh
 
 
 def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
@@ -82,7 +85,7 @@ def description(
         "length_unit": "mm",
         "volume_cm3": round(result.volume_cm3, 4),
         "volume_cm3_is": "of the smooth surface through the vertices, as in the window",
-        "volume_of_triangles_cm3": round(_triangles_cm3(result), 4),
+        "volume_of_triangles_cm3": round(_triangles(result).volume / 1000, 4),
         "volume_95_percent_margin_cm3": None if margin is None else round(margin, 4),
         "patient": None if patient is None else _patient_record(patient),
         "vertices": len(result.points_mm),
@@ -92,10 +95,11 @@ def description(
     }
 
 
-def _triangles_cm3(result: SurfaceResult) -> float:
-    """What the flat triangles of the file enclose (divergence theorem)."""
-    a, b, c = np.moveaxis(result.points_mm.astype(np.float64)[result.faces], 1, 0)
-    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6000
+def _triangles(result: SurfaceResult) -> trimesh.Trimesh:
+    import trimesh  # here, and pyvista below, because they would slow down the start
+
+    points = np.asarray(result.points_mm, dtype=np.float64)
+    return trimesh.Trimesh(points, result.faces, vertex_normals=result.normals, process=False)
 
 
 def _patient_record(patient: OpenScan) -> dict[str, Any]:
@@ -119,14 +123,10 @@ def _covariate_record(covariate: Covariate, value: float) -> dict[str, Any]:
 
 def _write_mesh(path: Path, ending: str, result: SurfaceResult) -> None:
     if ending == "vtp":
-        import pyvista as pv  # here, and trimesh below, because they would slow down the start
+        import pyvista as pv
 
         mesh = pv.PolyData.from_regular_faces(result.points_mm, result.faces)
         mesh.point_data.active_normals = result.normals
         mesh.save(path)
         return
-    import trimesh
-
-    points = np.asarray(result.points_mm, dtype=np.float64)
-    surface = trimesh.Trimesh(points, result.faces, vertex_normals=result.normals, process=False)
-    surface.export(path, file_type=ending)
+    _triangles(result).export(path, file_type=ending)
