@@ -29,7 +29,7 @@ def _command(name: str, kind: type[Study[Any]]) -> Callable[..., None]:
     def measure(
         study: Any, *, journal: JournalFile = None, workers: Workers = 1, json_file: JsonFile = None
     ) -> None:
-        if journal is not None and json_file == journal:
+        if journal is not None and json_file is not None and json_file.resolve() == journal.resolve():
             raise InputError(f"{journal} is to be the journal and the report; name two files")
         with bar(name) as progress:
             report = run(study, workers=workers, journal=journal, progress=progress)

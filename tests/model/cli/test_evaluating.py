@@ -46,9 +46,9 @@ def test_a_journal_of_another_evaluation_is_refused(egg_atlas, egg_store, tmp_pa
     assert journal.read_bytes() == kept
 
 
-def test_the_journal_is_not_replaced_by_the_report(egg_atlas, egg_store, tmp_path, capsys):
-    path = str(tmp_path / "both.jsonl")
+def test_the_journal_is_not_replaced_by_the_report(egg_atlas, egg_store, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     words = ["evaluate", "completion", str(egg_atlas), "--store", str(egg_store.path)]
-    assert cli.main([*words, "--journal", path, "--json", path]) == 2
+    assert cli.main([*words, "--journal", "both.jsonl", "--json", str(tmp_path / "both.jsonl")]) == 2
     assert "name two files" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
