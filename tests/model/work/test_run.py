@@ -47,21 +47,18 @@ def test_the_ctrl_c_of_a_terminal_is_left_to_the_parent():
 
 
 def test_the_ctrl_c_of_a_terminal_while_workers_start_is_the_parents_too():
-    """In a process group of its own, as a terminal gives one to a command."""
+    """In a process group of its own, as a terminal gives one to a command; at the first look at who waits,
+    right after the jobs went out: an interpreter takes longer than that to be ready."""
     program = (
         "import os, signal\n"
-        "from naisr_model.errors import Cancelled\n"
         "from naisr_model.progress import Progress\n"
         "from naisr_model.work.run import processes\n"
         "came, calls = [], []\n"
         "signal.signal(signal.SIGINT, lambda *_: came.append(1))\n"
         "def unwanted():\n"
         "    calls.append(1)\n"
-        "    if len(calls) == 2: os.killpg(0, signal.SIGINT)\n"
-        "    return len(calls) > 20\n"
-        "try:\n"
-        "    with processes(2) as work: print(sorted(work(abs, [-2, 3], Progress(is_unwanted=unwanted))))\n"
-        "except Cancelled: print('stopped')\n"
+        "    if len(calls) == 1: os.killpg(0, signal.SIGINT)\n"
+        "with processes(2) as work: print(sorted(work(abs, [-2, 3], Progress(is_unwanted=unwanted))))\n"
         "print(came)"
     )
     command = [sys.executable, "-c", program]
