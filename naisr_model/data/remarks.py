@@ -41,7 +41,7 @@ class Remark:
         return f"{self.sentence}; {self.remedy}" if self.remedy else self.sentence
 
     def to_json(self) -> dict[str, str]:
-        """For programs; the inverse of ``Remark(**record)``."""
+        """For programs."""
         return asdict(self)
 
 
