@@ -19,6 +19,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from naisr_model.data import meshes, volumes
+from naisr_model.data.remarks import Remark
 from naisr_model.errors import InputError
 from naisr_model.frames import BOX_MARGIN, Frame
 
@@ -35,7 +36,6 @@ PLAUSIBLE_SIZE = (0.15, 1.3)
 """Longest side of a shape over that of the population's largest: from a newborn, or a piece, up."""
 
 _FLAT = 1e-4
-_FEW_VOXELS = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class PatientShape:
             in the file.
         source: what was read, for example ``p01.nii.gz, label 2 'airway'``.
         space: ``LPS`` or ``RAS`` where the file says it, else empty.
-        remarks: what was odd about the file, a sentence each.
+        remarks: what was odd about the file.
         from_file: 4x4, coordinates as they were read to those of ``mesh_mm``, by every repair and
             motion since; landmarks of the file go the same way.
         units_known: whether a person said how long a unit is, so that it is not guessed.
@@ -57,7 +57,7 @@ class PatientShape:
     mesh_mm: trimesh.Trimesh
     source: str = ""
     space: Literal["LPS", "RAS", ""] = ""
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[Remark, ...] = ()
     from_file: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
     units_known: bool = False
 
@@ -111,8 +111,8 @@ def read_patient(path: str | Path, label: int | str | None = None) -> PatientSha
         InputError: when the file cannot be used, or a volume has several labels and none is chosen.
     """
     path = Path(path)
-    if path.name.lower().endswith(volumes.ENDINGS):
-        return _from_labels(path, volumes.read_labels(path), label)
+    if volumes.is_label_volume(path):
+        return _from_labels(path, label)
     if label is not None:
         raise InputError(f"{path.name} is no label volume, so label {label} cannot be chosen; leave it out")
     if path.suffix.lower() in POINT_ENDINGS:
@@ -144,36 +144,11 @@ def _cloud(points: NDArray[np.float64]) -> trimesh.Trimesh:
     return trimesh.Trimesh(points, np.zeros((0, 3), np.int64), process=False)
 
 
-def _from_labels(path: Path, volume: volumes.LabelVolume, label: int | str | None) -> PatientShape:
-    sizes_cm3 = volumes.volumes_cm3(volume)
-    if not sizes_cm3:
-        raise InputError(f"{path.name} has no label; every voxel is 0, segment the scan first")
-    listed = ", ".join(volumes.titles(volume).values())
-    if label is None and len(sizes_cm3) > 1:
-        raise InputError(f"{path.name} has {len(sizes_cm3)} labels ({listed}); choose one of them")
-    chosen = next(iter(sizes_cm3)) if label is None else _numbered(volume, label)
-    if chosen not in sizes_cm3:
-        raise InputError(f"{path.name} has no label {label}; it has {listed}")
+def _from_labels(path: Path, label: int | str | None) -> PatientShape:
+    volume, chosen = volumes.choose(path.name, volumes.read_labels(path), label)
     surface = volumes.label_surface(volume, chosen)
-    remarks = (*volume.remarks, *_label_remarks(volume, chosen, surface, sizes_cm3[chosen]))
+    remarks = (*volume.remarks, *volumes.label_remarks(volume, chosen, surface))
     return PatientShape(surface, f"{path.name}, label {volumes.titled(volume, chosen)}", "LPS", remarks)
-
-
-def _numbered(volume: volumes.LabelVolume, label: int | str) -> int | None:
-    """The label that is meant by a number or a name; None where no label is called so."""
-    numbers = {name.casefold(): number for number, name in volume.names.items()}
-    text = str(label).strip()
-    return numbers.get(text.casefold(), int(text) if text.isdecimal() else None)
-
-
-def _label_remarks(
-    volume: volumes.LabelVolume, label: int, surface: trimesh.Trimesh, size_cm3: float
-) -> tuple[str, ...]:
-    lost = abs(surface.volume) / 1000 / size_cm3 - 1
-    edge = "the label reaches the edge of the image and is cut off there; what lies beyond is not seen"
-    thin = f"parts are only a few voxels wide: the surface holds {100 * lost:+.0f} % of the voxels' volume"
-    applies = {edge: volumes.touches_edge(volume, label), thin: abs(lost) > _FEW_VOXELS}
-    return tuple(sentence for sentence, true in applies.items() if true)
 
 
 def read_points(path: str | Path) -> NDArray[np.float64]:

@@ -59,7 +59,7 @@ class Intake:
         """What is odd and was left, a sentence each."""
         found = (f"{finding.sentence}; {finding.remedy}" for finding in self.findings)
         doubt = () if self.proposal is None else _doubt(self.proposal)
-        return (*self.patient.remarks, *doubt, *found)
+        return (*(remark.text for remark in self.patient.remarks), *doubt, *found)
 
     @property
     def is_ready(self) -> bool:
@@ -124,19 +124,19 @@ def take_in(
     return intake
 
 
-def labels(path: str | Path) -> dict[int, str] | None:
+def labels(path: str | Path) -> dict[int | str, str] | None:
     """What :func:`read` may be asked for: of a label volume its labels, each with its name and size.
 
     Returns:
         A title by label, as ``{2: "2 'airway': 41.9 cm³"}``, empty where every voxel is 0; None of a file
-        that is no label volume.
+        that is no label volume. Labels of layers that overlap may share a number and go by their names.
 
     Raises:
         InputError: when a label volume cannot be used.
     """
-    if not Path(path).name.lower().endswith(volumes.ENDINGS):
+    if not volumes.is_label_volume(path):
         return None
-    return volumes.titles(volumes.read_labels(path))
+    return volumes.titles(Path(path).name, volumes.read_labels(path))
 
 
 def read(path: Path, atlas: Atlas, label: int | str | None = None, scale: float | None = None) -> Intake:

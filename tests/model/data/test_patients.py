@@ -150,7 +150,7 @@ def test_a_label_is_chosen(tmp_path, name):
     assert patient.mesh_mm.volume == pytest.approx(4 / 3 * np.pi * 12**3, rel=0.005)
     np.testing.assert_allclose(patient.mesh_mm.center_mass, [120, -30, 40], atol=0.02)
     (remark,) = read_patient(path, label=4).remarks
-    assert "edge of the image" in remark
+    assert "edge of the image" in remark.sentence
 
 
 def test_a_volume_without_labels_is_rejected(tmp_path):

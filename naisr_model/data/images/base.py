@@ -1,0 +1,199 @@
+"""What every reader of images shares: the image, its bytes, and one judgement of its axes."""
+
+from __future__ import annotations
+
+import bz2
+import math
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from naisr_model.data.remarks import Remark
+from naisr_model.errors import InputError
+
+MOST_BYTES = 1 << 30
+"""Of voxels as the file stores them; as whole numbers and as a surface they take a few times as much."""
+
+MOST_SHIFT = 0.1
+"""Voxels: how far straightening its axes may move one, and two matrices that say the same may differ."""
+
+_BLOCK = 1 << 20
+_HEADROOM = 1 << 24
+_GZIP = b"\x1f\x8b"
+
+
+@dataclass(frozen=True, eq=False)
+class Image:
+    """A file's voxels and where they lie.
+
+    Attributes:
+        voxels: as stored, ``[layers, i, j, k]``; nearly all files have one layer.
+        slope: what is meant is ``slope * voxels + intercept``.
+        intercept: see ``slope``.
+        to_lps_mm: 4x4, voxel indices ``(i, j, k, 1)`` of voxel centres to LPS millimetres; the axes are
+            orthogonal.
+        metadata: what else the file says, by key.
+        remarks: what is odd about the file.
+    """
+
+    voxels: NDArray[Any]
+    to_lps_mm: NDArray[np.float64]
+    metadata: Mapping[str, str]
+    remarks: tuple[Remark, ...]
+    slope: float = 1.0
+    intercept: float = 0.0
+
+
+# --- bytes --------------------------------------------------------------------------------------
+
+
+def beginning(path: Path, count: int) -> bytes:
+    """The first bytes of a file, unpacked where it is gzipped; fewer where it is shorter or damaged."""
+    try:
+        with path.open("rb") as file:
+            start = file.read(_BLOCK)
+    except OSError as error:
+        raise InputError(f"{path.name} cannot be read ({error.strerror}); check the file") from error
+    if not start.startswith(_GZIP):
+        return start[:count]
+    try:
+        return zlib.decompressobj(wbits=31).decompress(start, count)
+    except zlib.error:
+        return b""
+
+
+def content(path: Path) -> bytes:
+    """A whole file, unpacked where it is gzipped.
+
+    Raises:
+        InputError: when it cannot be read, or a gzip stream is damaged or cut off.
+    """
+    try:
+        with path.open("rb") as file:
+            packed = file.read(2) == _GZIP
+            file.seek(0)
+            most = MOST_BYTES + _HEADROOM
+            return unpacked(path.name, file, "gzip", most) if packed else file.read(most)
+    except OSError as error:
+        raise InputError(f"{path.name} cannot be read ({error.strerror}); check the file") from error
+
+
+def unpacked(name: str, file: BinaryIO, encoding: str, most: int) -> bytes:
+    """Up to ``most`` bytes of gzip or bzip2 streams one after another; what follows them is left out.
+
+    Raises:
+        InputError: when a stream is damaged or cut off.
+    """
+    found, packed = bytearray(), file.read(_BLOCK)
+    magic = packed[:2]
+    try:
+        while packed[:2] == magic and len(found) < most:
+            packed = _stream(name, file, packed, encoding, found, most)
+    except (zlib.error, OSError) as error:
+        raise InputError(f"{name} is damaged ({error}); copy or export it again") from error
+    return bytes(found)
+
+
+def _stream(name: str, file: BinaryIO, packed: bytes, encoding: str, found: bytearray, most: int) -> bytes:
+    """Unpack one stream; returns what follows it, as much as was read."""
+    unpacker: Any = zlib.decompressobj(wbits=31) if encoding == "gzip" else bz2.BZ2Decompressor()
+    while not unpacker.eof and len(found) < most:
+        found += unpacker.decompress(packed, min(_BLOCK, most - len(found)))
+        rest = getattr(unpacker, "unconsumed_tail", b"")  # bzip2 keeps its own
+        wants = not rest and getattr(unpacker, "needs_input", True)
+        packed = file.read(_BLOCK) if wants and not unpacker.eof else rest
+        if wants and not packed and not unpacker.eof:
+            raise InputError(f"{name} is cut off; copy or export it again")
+    return unpacker.unused_data + file.read(2 if len(unpacker.unused_data) < 2 else 0)
+
+
+def require_size(name: str, counts: Sequence[int], itemsize: int) -> None:
+    """Refuse what no segmentation announces, before memory is taken for it.
+
+    Args:
+        name: of the file.
+        counts: voxels along every axis.
+        itemsize: bytes a voxel.
+    """
+    size = " x ".join(map(str, counts))
+    if min(counts, default=0) < 1:
+        raise InputError(f"{name} announces {size} voxels; it is damaged, export it again")
+    if math.prod(counts) * itemsize > MOST_BYTES:
+        raise InputError(
+            f"{name} announces {size} voxels, more than {MOST_BYTES >> 20:,} MB; crop it around the shape"
+        )
+
+
+def require_volume(name: str, counts: Sequence[int]) -> None:
+    """Refuse an image without extent along one of three axes."""
+    if len(counts) < 3 or min(counts[:3]) < 2:
+        size = " x ".join(map(str, counts))
+        raise InputError(f"{name} is a two-dimensional image ({size}); give the whole volume")
+
+
+def require_one_value(name: str, count: int) -> None:
+    """Refuse colours, vectors and series in time."""
+    if count != 1:
+        raise InputError(f"{name} holds {count} values a voxel; save one label volume alone")
+
+
+def cut_off(name: str, announced: int, found: int) -> InputError:
+    """A file with fewer bytes of voxels than its header announces."""
+    sentence = f"{name} is cut off: it announces {announced:,} bytes of voxels and has {max(found, 0):,}"
+    return InputError(f"{sentence}; copy or export it again")
+
+
+# --- axes ---------------------------------------------------------------------------------------
+
+
+def squared(name: str, matrix: NDArray[np.float64], counts: Sequence[int]) -> NDArray[np.float64]:
+    """The matrix with its axes at right angles, the middle of the image where it was.
+
+    Headers round directions; the nearest orthogonal axes (polar decomposition) are what was meant, unless
+    they move a voxel by more than :data:`MOST_SHIFT`.
+
+    Args:
+        name: of the file.
+        matrix: 4x4, voxel indices to millimetres.
+        counts: voxels along each index axis.
+
+    Raises:
+        InputError: when a number is not finite, an axis has no length or the axes are sheared.
+    """
+    if not np.isfinite(matrix).all():
+        raise InputError(f"{name} has axes that are not finite numbers; export it again")
+    steps = np.linalg.norm(matrix[:3, :3], axis=0)
+    if not (steps > 0).all() or not np.isfinite(steps).all():
+        size = " x ".join(f"{step:g}" for step in steps)
+        raise InputError(f"{name} has voxels of {size} mm; set the spacing and export it again")
+    left, _, right = np.linalg.svd(matrix[:3, :3] / steps)
+    straight, middle = matrix.copy(), (np.array(counts) - 1) / 2
+    straight[:3, :3] = left @ right * steps
+    straight[:3, 3] += (matrix - straight)[:3, :3] @ middle
+    if shift(straight, matrix, counts) > MOST_SHIFT:
+        raise InputError(f"the axes of {name} are not at right angles; resample it onto a rectangular grid")
+    return straight
+
+
+def shift(one: NDArray[np.float64], other: NDArray[np.float64], counts: Sequence[int]) -> float:
+    """By how many voxels of ``one``, which is invertible, two matrices place a corner of the image apart."""
+    corners = np.stack(np.meshgrid(*[[0, count - 1] for count in counts], [1], indexing="ij"), -1).reshape(
+        -1, 4
+    )
+    apart = np.linalg.inv(one)[:3, :3] @ ((other - one) @ corners.T)[:3]
+    return float(np.abs(apart).max())
+
+
+def unplaced() -> Remark:
+    """For a file that does not name its axes."""
+    return Remark(
+        "look",
+        "orientation",
+        "the file does not say how the patient lies",
+        "do not rely on left and right",
+    )

@@ -1,0 +1,169 @@
+"""NIfTI-1 and NIfTI-2 in one file, ``.nii`` or ``.nii.gz``: headers by nibabel, judged here.
+
+nibabel would repair odd headers and say so on stderr; what is wrong with one is for the user to know.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from naisr_model.data.images.base import (
+    MOST_SHIFT,
+    Image,
+    cut_off,
+    require_one_value,
+    require_size,
+    require_volume,
+    shift,
+    squared,
+    unplaced,
+)
+from naisr_model.data.remarks import Remark
+from naisr_model.errors import InputError
+
+RAS_TO_LPS = np.diag([-1.0, -1.0, 1.0, 1.0])
+UNITS_MM = {1: 1000.0, 3: 0.001}
+"""Metres and micrometres; every other code, the one for unknown too, is taken for millimetres."""
+
+_UNEQUAL = 0.01
+
+
+def read_nifti(name: str, content: bytes) -> Image:
+    """Read a NIfTI file; the axes are those that nibabel takes: sform, else qform, else pixdim.
+
+    Args:
+        name: of the file, for messages.
+        content: the whole file, unpacked.
+
+    Raises:
+        InputError: when the file is damaged or cut off, or is no single volume of numbers.
+    """
+    header = _header(name, content)
+    counts, dtype = _counts(name, header), _dtype(name, header)
+    require_size(name, counts, dtype.itemsize)
+    require_one_value(name, math.prod(counts[3:]))
+    require_volume(name, counts)
+    counts = counts[:3]
+    slope, intercept = _scale(name, header)
+    voxels = _voxels(name, content, header, counts, dtype)
+    ras = _matrix(name, header)
+    lps_mm = squared(name, _unit_mm(header) @ RAS_TO_LPS @ ras, counts)
+    remarks = (*_position_remarks(header, ras, counts), *_spacing_remarks(header, ras))
+    return Image(voxels[None], lps_mm, {}, remarks, slope, intercept)
+
+
+def _header(name: str, content: bytes) -> Any:
+    import nibabel
+
+    kinds = {348: nibabel.Nifti1Header, 540: nibabel.Nifti2Header}
+    size = 348 if content[344:347] == b"n+1" else 540
+    if len(content) < size:
+        raise InputError(f"{name} is cut off; copy or export it again")
+    return kinds[size](content[:size], check=False)
+
+
+def _counts(name: str, header: Any) -> list[int]:
+    dimensions = int(header["dim"][0])
+    if not 1 <= dimensions <= 7:
+        raise InputError(f"{name} announces {dimensions} dimensions; it is damaged, export it again")
+    counts = [int(count) for count in header["dim"][1 : dimensions + 1]]
+    while len(counts) > 3 and counts[-1] == 1:
+        counts.pop()
+    return counts
+
+
+def _dtype(name: str, header: Any) -> np.dtype:
+    from nibabel.spatialimages import HeaderDataError
+
+    try:
+        dtype = header.get_data_dtype()
+    except HeaderDataError as error:
+        raise InputError(f"{name} has voxels of an unknown type ({error}); export it again") from error
+    if dtype.names or dtype.kind not in "iuf":
+        raise InputError(f"{name} holds colours or complex numbers; save whole-number labels")
+    return dtype
+
+
+def _scale(name: str, header: Any) -> tuple[float, float]:
+    from nibabel.spatialimages import HeaderDataError
+
+    try:
+        slope, intercept = header.get_slope_inter()
+    except HeaderDataError as error:
+        raise InputError(f"{name} has values that cannot be scaled ({error}); export it again") from error
+    return (1.0, 0.0) if slope is None else (slope, intercept)
+
+
+def _voxels(name: str, content: bytes, header: Any, counts: list[int], dtype: np.dtype) -> NDArray[Any]:
+    first, least = float(header["vox_offset"]), int(header["sizeof_hdr"]) + 4
+    if not 0 <= first < math.inf:
+        raise InputError(f"{name} does not say where its voxels begin; it is damaged, export it again")
+    offset, count = max(int(first), least), math.prod(counts)
+    if len(content) - offset < count * dtype.itemsize:
+        raise cut_off(name, count * dtype.itemsize, len(content) - offset)
+    return np.frombuffer(content, dtype, count, offset).reshape(counts, order="F")
+
+
+def _matrix(name: str, header: Any) -> NDArray[np.float64]:
+    """Voxel indices to RAS in the file's unit."""
+    if _is_coded(header, "sform"):
+        return np.asarray(header.get_sform(), np.float64)
+    spacing = header["pixdim"][1:4]
+    if not (np.isfinite(spacing) & (spacing > 0)).all():
+        size = " x ".join(f"{step:g}" for step in spacing)
+        raise InputError(f"{name} has voxels of {size} mm; set the spacing and export it again")
+    if not _is_coded(header, "qform"):
+        return np.asarray(header.get_base_affine(), np.float64)
+    matrix = _qform(header)
+    if matrix is None:
+        raise InputError(f"{name} has a damaged orientation (qform); set it and export it again")
+    return matrix
+
+
+def _is_coded(header: Any, form: str) -> bool:
+    return bool(header[f"{form}_code"] != 0)
+
+
+def _qform(header: Any) -> NDArray[np.float64] | None:
+    """None where it is damaged; its handedness may be left out, which is then the usual one."""
+    header = header.copy()
+    if header["pixdim"][0] not in (-1, 1):
+        header["pixdim"][0] = 1
+    try:
+        matrix = np.asarray(header.get_qform(), np.float64)
+    except ValueError:  # also nibabel's HeaderDataError
+        return None
+    return matrix if np.isfinite(matrix).all() else None
+
+
+def _unit_mm(header: Any) -> NDArray[np.float64]:
+    factor = UNITS_MM.get(int(header["xyzt_units"]) & 7, 1.0)
+    return np.diag([factor, factor, factor, 1.0])
+
+
+def _position_remarks(header: Any, used: NDArray[np.float64], counts: list[int]) -> tuple[Remark, ...]:
+    if not _is_coded(header, "sform") and not _is_coded(header, "qform"):
+        return (unplaced(),)
+    other = _qform(header) if _is_coded(header, "qform") else used
+    if other is None or shift(used, other, counts) <= MOST_SHIFT:
+        return ()
+    corner = np.linalg.norm((other - used)[:3] @ [*(np.array(counts) - 1) / 2, 1]) * _unit_mm(header)[0, 0]
+    sentence = (
+        "the file places the image in two ways (sform and qform) that differ, in the middle of the image by "
+        f"{corner:.3g} mm; the sform is used"
+    )
+    return (Remark("look", "orientation", sentence, "check place, size and sides against the scan"),)
+
+
+def _spacing_remarks(header: Any, used: NDArray[np.float64]) -> tuple[Remark, ...]:
+    told, steps = np.asarray(header["pixdim"][1:4], np.float64), np.linalg.norm(used[:3, :3], axis=0)
+    if (np.abs(told - steps) <= _UNEQUAL * steps).all():
+        return ()
+    unit = _unit_mm(header)[0, 0]
+    one, other = (" x ".join(f"{step * unit:.3g}" for step in each) for each in (told, steps))
+    sentence = f"the file gives its voxels {one} mm (pixdim) and {other} mm (sform); the latter is used"
+    return (Remark("look", "spacing", sentence, "compare the volume with the one you expect"),)
