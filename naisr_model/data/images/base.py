@@ -151,15 +151,18 @@ def cut_off(name: str, announced: int, found: int) -> InputError:
 # --- axes ---------------------------------------------------------------------------------------
 
 
-def squared(name: str, matrix: NDArray[np.float64], counts: Sequence[int]) -> NDArray[np.float64]:
-    """The matrix with its axes at right angles, the middle of the image where it was.
+def squared(
+    name: str, to_lps_mm: NDArray[np.float64], matrix: NDArray[np.float64], counts: Sequence[int]
+) -> NDArray[np.float64]:
+    """Voxel indices to LPS millimetres with axes at right angles, the middle of the image where it was.
 
     Headers round directions; the nearest orthogonal axes (polar decomposition) are what was meant, unless
     they move a voxel by more than :data:`MOST_SHIFT`.
 
     Args:
         name: of the file.
-        matrix: 4x4, voxel indices to millimetres.
+        to_lps_mm: 4x4, the file's world and unit to LPS millimetres.
+        matrix: 4x4, voxel indices to the file's world.
         counts: voxels along each index axis.
 
     Raises:
@@ -167,6 +170,7 @@ def squared(name: str, matrix: NDArray[np.float64], counts: Sequence[int]) -> ND
     """
     if not np.isfinite(matrix).all():
         raise InputError(f"{name} has axes that are not finite numbers; export it again")
+    matrix = to_lps_mm @ matrix
     steps = np.linalg.norm(matrix[:3, :3], axis=0)
     if not (steps > 0).all() or not np.isfinite(steps).all():
         size = " x ".join(f"{step:g}" for step in steps)

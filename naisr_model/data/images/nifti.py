@@ -51,7 +51,7 @@ def read_nifti(name: str, content: bytes) -> Image:
     slope, intercept = _scale(name, header)
     voxels = _voxels(name, content, header, counts, dtype)
     ras = _matrix(name, header)
-    lps_mm = squared(name, _unit_mm(header) @ RAS_TO_LPS @ ras, counts)
+    lps_mm = squared(name, _unit_mm(header) @ RAS_TO_LPS, ras, counts)
     remarks = (*_position_remarks(header, ras, counts), *_spacing_remarks(header, ras))
     return Image(voxels[None], lps_mm, {}, remarks, slope, intercept)
 

@@ -100,7 +100,7 @@ def read_nrrd(path: Path, content: bytes) -> Image:
     matrix = np.eye(4)
     matrix[:3, :3] = directions[spatial].T
     matrix[:3, 3], origin_remarks = _origin(header)
-    lps_mm = squared(path.name, _to_lps_mm(path.name, header) @ matrix, size)
+    lps_mm = squared(path.name, _to_lps_mm(path.name, header), matrix, size)
     unknown = () if is_placed and _word(header, "space") in SIGNS_TO_LPS else (unplaced(),)
     return Image(voxels, lps_mm, metadata, (*unknown, *origin_remarks))
 
@@ -160,6 +160,8 @@ def _directions(name: str, header: Mapping[str, Any], count: int) -> tuple[NDArr
     directions = header.get("space directions")
     if directions is not None:
         rows = np.asarray(directions, np.float64)
+        if np.isnan(rows).all():
+            raise _unspaced(name)
         if rows.shape != (count, 3):
             raise InputError(f"{name} has axes in a space that is not three-dimensional; export it again")
         return rows, True

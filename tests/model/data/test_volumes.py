@@ -9,7 +9,18 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from naisr_model.data.volumes import label_surface, read_labels, touches_edge, volumes_cm3
+from naisr_model.data.patients import read_patient, rim
+from naisr_model.data.volumes import (
+    LabelVolume,
+    choose,
+    is_label_volume,
+    label_remarks,
+    label_surface,
+    read_labels,
+    titles,
+    touches_edge,
+    volumes_cm3,
+)
 from naisr_model.errors import InputError
 
 RAS = np.diag([-1.0, -1.0, 1.0, 1.0])
@@ -111,8 +122,6 @@ def test_the_ellipsoid_is_where_it_is_in_lps(tmp_path, name, steps):
 
 
 def test_a_thin_tube_keeps_its_volume():
-    from naisr_model.data.volumes import LabelVolume
-
     axis = np.array([1.0, 0.5, 0.3]) / np.linalg.norm([1.0, 0.5, 0.3])
     points = np.stack(np.meshgrid(*[np.arange(40.0)] * 3, indexing="ij"), axis=-1) - [19.8, 19.7, 19.9]
     along = np.clip(points @ axis, -14, 14)
@@ -120,6 +129,7 @@ def test_a_thin_tube_keeps_its_volume():
     volume = LabelVolume(inside.astype(np.uint8), np.eye(4), {}, ())
     true_mm3 = np.pi * 2.5**2 * 28 + 4 / 3 * np.pi * 2.5**3
     assert label_surface(volume, 1).volume == pytest.approx(true_mm3, rel=0.03)
+    assert label_remarks(volume, 1, label_surface(volume, 1)) == ()
 
 
 def test_labels_are_told_apart_and_named(tmp_path):
@@ -136,12 +146,27 @@ def test_labels_are_told_apart_and_named(tmp_path):
     assert not len(label_surface(volume, 5).faces)
 
 
-def test_whole_numbers_stored_as_fractions_are_labels(tmp_path):
+@pytest.mark.parametrize("value", [2.00007, 6.9999, 6.9999999, 2.0, 3e9, -3.0])
+@pytest.mark.parametrize("name", ["float.nii", "float.nrrd"])
+def test_whole_numbers_stored_as_fractions_are_labels(tmp_path, name, value):
     voxels = np.zeros((9, 9, 9), np.float32)
-    voxels[3:6, 3:6, 3:6] = 2
-    volume = read_labels(write(tmp_path / "float.nii", nifti(voxels, np.eye(4))))
+    voxels[3:6, 3:6, 3:6] = value
+    write_as = nifti if name == "float.nii" else nrrd
+    volume = read_labels(write(tmp_path / name, write_as(voxels, np.eye(4))))
     assert np.issubdtype(volume.labels.dtype, np.integer)
-    assert volumes_cm3(volume) == {2: pytest.approx(0.027)}
+    assert volumes_cm3(volume) == {round(value): pytest.approx(0.027)}
+
+
+@pytest.mark.parametrize(("slope", "intercept"), [(1.0, 0.0), (0.1, 0.0), (2.0, 5.0), (-1.0, 0.0)])
+def test_scaled_integers_are_labels(tmp_path, slope, intercept):
+    voxels = np.full((9, 9, 9), round(-intercept / slope), np.int16)
+    voxels[3:6, 3:6, 3:6] = round((7 - intercept) / slope)
+    content = bytearray(nifti(voxels, np.eye(4)))
+    struct.pack_into("<2f", content, 112, slope, intercept)
+    volume = read_labels(write(tmp_path / "a.nii", bytes(content)))
+    sizes = volumes_cm3(volume)
+    assert sizes[7] == pytest.approx(0.027)
+    assert set(sizes) <= {-1, 1, 7}  # a step of 2 does not reach 0
 
 
 @pytest.mark.parametrize("name", ["plain.nii", "plain.nrrd"])
@@ -205,3 +230,178 @@ def test_a_volume_that_was_cut_off_is_rejected(tmp_path, name):
         whole.write_bytes(content[: int(share * len(content))])
         with pytest.raises(InputError, match=name):
             read_labels(whole)
+
+
+# --- choosing -----------------------------------------------------------------------------------
+
+
+def cubes(**labels: int) -> np.ndarray:
+    """Cubes of ten voxels' length beside each other, of the labels in their order."""
+    voxels = np.zeros((12 * len(labels), 12, 12), np.int16)
+    for place, label in enumerate(labels.values()):
+        voxels[12 * place + 1 : 12 * place + 11, 1:11, 1:11] = label
+    return voxels
+
+
+def segments(*named: tuple[str, int, int]) -> str:
+    """Header lines of 3D Slicer: name, label value and layer of each segment."""
+    return "".join(
+        f"Segment{n}_Name:={name}\nSegment{n}_LabelValue:={value}\nSegment{n}_Layer:={layer}\n"
+        for n, (name, value, layer) in enumerate(named)
+    )
+
+
+def chosen(path, label) -> int:
+    return choose(path.name, read_labels(path), label)[1]
+
+
+def test_a_number_comes_before_a_name_and_a_name_before_its_other_spellings(tmp_path):
+    names = segments(
+        ("1", 2, 0), ("airway", 1, 0), ("Airway", 3, 0), ("AIRWAY", 4, 0), ("tongue", 5, 0), ("9", 6, 0)
+    )
+    content = nrrd(cubes(a=1, b=2, c=3, d=4, e=5, f=6), np.eye(4), extra=names)
+    path = write(tmp_path / "a.nrrd", content)
+    assert [chosen(path, label) for label in ("1", 1, " 2 ", "+3")] == [1, 1, 2, 3]
+    assert chosen(path, "9") == 6  # there is no label 9
+    assert [chosen(path, label) for label in ("airway", "Airway", "AIRWAY")] == [1, 3, 4]
+    assert chosen(path, "TONGUE") == 5
+    with pytest.raises(InputError, match=r"3 labels that 'aIRWAY' may mean; choose one of '1', '3', '4'"):
+        chosen(path, "aIRWAY")
+    for unknown in ("7", "-1", "0", "nose", "1.5", ""):
+        with pytest.raises(InputError, match=rf"no label {unknown}; it has 1 'airway': 1 cm³, 2 '1': 1 cm³"):
+            chosen(path, unknown)
+
+
+def test_a_label_that_is_named_is_read_among_any_others(tmp_path):
+    voxels = np.arange(1, 1 + 15**3, dtype=np.int16).reshape(15, 15, 15) % 1500
+    voxels[4:8, 4:8, 4:8] = 4512
+    path = write(tmp_path / "many.nii", nifti(voxels, np.eye(4)))
+    assert chosen(path, "4512") == 4512
+    assert read_patient(path, "4512").mesh_mm.volume == pytest.approx(64, rel=0.02)
+    with pytest.raises(InputError, match=r"many\.nii holds 1,500 values from 1 to 4512, so it is a scan"):
+        chosen(path, None)
+    with pytest.raises(InputError, match="so it is a scan"):
+        titles(path.name, read_labels(path))
+    with pytest.raises(InputError, match=r"no label 1777; it has 1: .* and 1,492 more"):
+        chosen(path, 1777)
+
+
+def test_negative_labels_are_chosen_and_never_taken_unasked(tmp_path):
+    path = write(tmp_path / "a.nii", nifti(cubes(a=-3, b=2), np.eye(4)))
+    assert chosen(path, "-3") == chosen(path, -3) == -3
+    with pytest.raises(InputError, match=r"2 labels \(-3: 1 cm³, 2: 1 cm³\); choose one"):
+        chosen(path, None)
+    path = write(tmp_path / "b.nii", nifti(cubes(a=-1), np.eye(4)))
+    with pytest.raises(InputError, match=r"a negative label alone \(-1: 1 cm³\); choose"):
+        chosen(path, None)
+
+
+def test_a_list_of_labels_is_short(tmp_path):
+    voxels = np.arange(1, 1 + 6**3, dtype=np.int16).reshape(6, 6, 6)
+    path = write(tmp_path / "a.nii", nifti(voxels, np.eye(4)))
+    with pytest.raises(
+        InputError, match=r"216 labels \(1: 0\.001 cm³, .* and 208 more\); choose one"
+    ) as error:
+        chosen(path, None)
+    assert len(str(error.value)) < 250
+
+
+def layered(tmp_path, *named: tuple[str, int, int]):
+    """Two layers: cubes of 10 and of 6 voxels' length inside each other, one label 1, one 1, then 2 apart."""
+    voxels = np.zeros((2, 14, 14, 30), np.uint8)
+    voxels[0, 2:12, 2:12, 2:12] = 1
+    voxels[1, 4:10, 4:10, 4:10] = 1
+    voxels[1, 2:12, 2:12, 16:26] = 2
+    header = nrrd(voxels[0], np.diag([2.0, 2, 2, 1]), extra=segments(*named)).split(b"\n\n")[0].decode()
+    for old, new in (
+        ("dimension: 3", "dimension: 4"),
+        ("sizes: ", "sizes: 2 "),
+        ("directions: ", "directions: none "),
+        ("kinds: ", "kinds: list "),
+    ):
+        header = header.replace(old, new)
+    return write(tmp_path / "two.seg.nrrd", f"{header}\n\n".encode() + voxels.tobytes(order="F"))
+
+
+def test_overlapping_segments_are_chosen_by_name(tmp_path):
+    path = layered(tmp_path, ("airway", 1, 0), ("tongue", 1, 1), ("nose", 2, 1))
+    sizes = {label: read_patient(path, label).mesh_mm.volume for label in ("airway", "tongue", "Nose", 2)}
+    assert sizes == pytest.approx({"airway": 8000, "tongue": 1728, "Nose": 8000, 2: 8000}, rel=0.02)
+    assert read_patient(path, "tongue").source == "two.seg.nrrd, label 1 'tongue'"
+    with pytest.raises(InputError, match=r"2 labels that '1' may mean; choose one of 'airway', 'tongue'"):
+        read_patient(path, 1)
+    with pytest.raises(
+        InputError, match=r"3 labels \(1 'airway': 8 cm³, 1 'tongue': 1\.73 cm³, 2 'nose': 8 cm³\)"
+    ):
+        read_patient(path)
+
+
+@pytest.mark.parametrize("names", [("airway", "tongue"), ("same", "same"), ("1", "2"), ("", "")])
+def test_every_title_leads_to_its_own_label(tmp_path, names):
+    path = layered(tmp_path, (names[0], 1, 0), (names[1], 1, 1))
+    volume = read_labels(path)
+    told = titles(path.name, volume)
+    assert len(told) == 3
+    found = {id(layer.labels): label for layer, label in (choose(path.name, volume, key) for key in told)}
+    volumes = sorted(read_patient(path, key).mesh_mm.volume for key in told)
+    assert volumes == pytest.approx([1728, 8000, 8000], rel=0.02)
+    assert len(found) == 2
+
+
+# --- surfaces -----------------------------------------------------------------------------------
+
+
+def touching(*corners: tuple[int, int, int], side: int = 9) -> np.ndarray:
+    """Cubes of voxels."""
+    where = np.zeros((40, 40, 40), np.uint8)
+    for i, j, k in corners:
+        where[i : i + side, j : j + side, k : k + side] = 1
+    return where
+
+
+MEETING = {
+    "one": touching((3, 3, 3)),
+    "edge": touching((3, 3, 3), (12, 12, 3)),
+    "corner": touching((3, 3, 3), (12, 12, 12)),
+    "stairs": touching((3, 3, 3), (12, 12, 3), (21, 3, 3), (12, 3, 12), (21, 12, 12), side=9),
+    "voxel": touching((3, 3, 3), side=1),
+    "two voxels": touching((3, 3, 3), (4, 4, 3), side=1),
+    "debris": touching((3, 3, 3), side=20) | touching((30, 30, 30), (33, 33, 33), side=1),
+    "cavity": touching((3, 3, 3), side=20) - touching((9, 9, 9), (14, 14, 9), side=5),
+    "noise": (np.random.default_rng(0).random((40, 40, 40)) < 0.4).astype(np.uint8),
+    "checker": (np.indices((40, 40, 40)).sum(axis=0) % 2).astype(np.uint8),
+}
+
+
+@pytest.mark.parametrize("spacing", [(1.0, 1.0, 1.0), (0.8, 0.8, 2.5)])
+@pytest.mark.parametrize("kind", MEETING)
+def test_voxels_that_meet_anyhow_have_a_closed_surface_of_their_volume(kind, spacing):
+    where = MEETING[kind]
+    volume = LabelVolume(where, np.diag([*spacing, 1.0]), {}, ())
+    surface = label_surface(volume, 1)
+    assert surface.is_watertight and not len(rim(surface))
+    assert surface.volume == pytest.approx(where.sum() * np.prod(spacing), rel=0.01)
+
+
+@pytest.mark.parametrize("radius", [1.5, 2.0, 3.0])
+def test_a_narrow_label_is_told(radius):
+    index = np.indices((60, 20, 20)) - np.array([30.1, 9.7, 9.8])[:, None, None, None]
+    where = (np.linalg.norm(index[1:], axis=0) < radius) & (np.abs(index[0]) < 25)
+    volume = LabelVolume(where.astype(np.uint8), np.diag([0.5, 0.5, 0.5, 1.0]), {}, ())
+    surface = label_surface(volume, 1)
+    assert surface.volume == pytest.approx(where.sum() / 8, rel=0.01)
+    assert [remark.topic for remark in label_remarks(volume, 1, surface)] == (["thin"] if radius < 2 else [])
+
+
+# --- which reader -------------------------------------------------------------------------------
+
+
+def test_a_label_volume_is_known_by_what_it_holds(tmp_path):
+    content = nifti(cubes(a=1), np.eye(4))
+    for name in ("scan.stl", "scan.csv", "scan"):
+        path = write(tmp_path / name, content)
+        assert is_label_volume(path)
+        assert read_patient(path).mesh_mm.volume == pytest.approx(1000, rel=0.02)
+    path = write(tmp_path / "points.csv", b"x,y,z\n0,0,0\n")
+    assert not is_label_volume(path)
+    assert is_label_volume(tmp_path / "gone.nii")
