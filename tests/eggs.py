@@ -5,8 +5,9 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
+import nibabel
+import nrrd
 import numpy as np
-import SimpleITK
 import trimesh
 from numpy.typing import ArrayLike, NDArray
 
@@ -14,6 +15,9 @@ from naisr_model.config import Preset, SirenConfig
 from naisr_model.models.deepsdf import DeepSdfConfig
 from naisr_model.models.factory import preset
 from naisr_model.models.naisr.network import NaisrConfig
+
+RAS = np.diag([-1.0, -1.0, 1.0, 1.0])
+"""LPS to RAS and back."""
 
 
 def egg(age: float, sex: float) -> trimesh.Trimesh:
@@ -70,14 +74,17 @@ def turned(degrees: float, shift_mm: ArrayLike) -> NDArray[np.float64]:
 
 def label_volume(path: Path) -> Path:
     """Label 1 a small block, label 2 the egg, in voxels of 1 mm; NRRD can name it."""
-    z, y, x = np.mgrid[-45:46, -30:31, -30:31]
+    x, y, z = np.mgrid[-30:31, -30:31, -45:46]
     half_mm = np.abs(egg(6.0, 1.0).bounds[0])
     inside = (x / half_mm[0]) ** 2 + (y / half_mm[1]) ** 2 + (z / half_mm[2]) ** 2 < 1
     labels = 2 * inside.astype(np.uint8)
     labels[:4, :4, :4] = 1
-    image = SimpleITK.GetImageFromArray(labels)
-    image.SetOrigin((-30.0, -30.0, -45.0))
-    for key, value in {"LabelValue": "2", "Name": "egg"}.items():
-        image.SetMetaData(f"Segment0_{key}", value)
-    SimpleITK.WriteImage(image, str(path))
+    origin = np.array([-30.0, -30.0, -45.0])
+    if path.suffix == ".nrrd":
+        space = {"space": "LPS", "space directions": np.eye(3), "space origin": origin}
+        nrrd.write(str(path), labels, space | {"Segment0_LabelValue": "2", "Segment0_Name": "egg"})
+    else:
+        nibabel.Nifti1Image(labels, RAS @ trimesh.transformations.translation_matrix(origin)).to_filename(
+            path
+        )
     return path

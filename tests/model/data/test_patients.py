@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import nibabel
+import nrrd
 import numpy as np
 import pytest
 import pyvista
@@ -125,15 +127,17 @@ def test_other_files_are_explained(tmp_path):
 
 def labelled(tmp_path, name="scan.nii.gz"):
     """Two balls of 12 and 6 mm in voxels of half a millimetre, the small one cut by the image's edge."""
-    import SimpleITK as sitk  # noqa: N813
-
     index = np.stack(np.meshgrid(*[np.arange(80)] * 3, indexing="ij"), axis=-1) / 2
     voxels = np.where(np.linalg.norm(index - 20, axis=-1) < 12, 1, 0)
     voxels[np.linalg.norm(index - [37, 37, 37], axis=-1) < 6] = 4
-    image = sitk.GetImageFromArray(voxels.transpose(2, 1, 0).astype(np.uint8))
-    image.SetSpacing((0.5, 0.5, 0.5))
-    image.SetOrigin((100.0, -50.0, 20.0))
-    sitk.WriteImage(image, str(tmp_path / name))
+    matrix = np.diag([0.5, 0.5, 0.5, 1.0])
+    matrix[:3, 3] = (100, -50, 20)
+    if name.endswith("nrrd"):
+        space = {"space": "LPS", "space directions": matrix[:3, :3], "space origin": matrix[:3, 3]}
+        nrrd.write(str(tmp_path / name), voxels.astype(np.uint8), space)
+    else:
+        image = nibabel.Nifti1Image(voxels.astype(np.uint8), np.diag([-1, -1, 1, 1]) @ matrix)
+        image.to_filename(tmp_path / name)
     return tmp_path / name
 
 
@@ -154,9 +158,8 @@ def test_a_label_is_chosen(tmp_path, name):
 
 
 def test_a_volume_without_labels_is_rejected(tmp_path):
-    import SimpleITK as sitk  # noqa: N813
-
-    sitk.WriteImage(sitk.Image([9, 9, 9], sitk.sitkUInt8), str(tmp_path / "none.nrrd"))
+    space = {"space": "LPS", "space directions": np.eye(3), "space origin": np.zeros(3)}
+    nrrd.write(str(tmp_path / "none.nrrd"), np.zeros((9, 9, 9), np.uint8), space)
     with pytest.raises(InputError, match=r"none\.nrrd has no label; every voxel is 0"):
         read_patient(tmp_path / "none.nrrd")
 
