@@ -48,6 +48,7 @@ def view(
     *,
     settings: Annotated[list[str] | None, Parameter("--set", negative=())] = None,
     scan: Path | None = None,
+    label: str | None = None,
     screenshot: Path | None = None,
     demo: Path | None = None,
     measure: Path | None = None,
@@ -64,6 +65,8 @@ def view(
         Where a covariate starts, as NAME=VALUE in real units: --set age=120 --set sex=M.
     scan
         A patient's file to open at once: a mesh, a label volume or a cloud of points.
+    label
+        Which label of a volume, its number or its name; with --scan.
     screenshot
         Write a picture of the window to this PNG file and end; needs no display.
     demo
@@ -81,13 +84,15 @@ def view(
     pixels = parse_size(size)
     if not path.is_file():
         raise InputError(f"there is no file {path}; give the path of an atlas (.safetensors)")
+    if label is not None and scan is None:
+        raise InputError(f"--label {label} is of a scan; give --scan FILE too")
     engine = start.make_engine(device)
     if measure is not None:
-        if settings or scan or screenshot or demo:
+        if settings or scan or label is not None or screenshot or demo:
             raise InputError("--measure times the window as it starts; leave out the other options")
         return start.measured(engine, path, pixels, measure, LOADED)
     card = engine.open(path) if settings or screenshot or demo else None
-    first = start.First(path, card, parse_settings(card, settings or []) if card else {}, scan)
+    first = start.First(path, card, parse_settings(card, settings or []) if card else {}, scan, label)
     if screenshot or demo:
         return start.unattended(engine, first, pixels, screenshot, demo)
     return start.attended(engine, first, pixels)

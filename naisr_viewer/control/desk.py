@@ -57,6 +57,7 @@ class PatientDesk(QObject):
         controller.refinement.settled.connect(self._read_next)
         controller.refinement.settled.connect(self._watch)
         window.scan_requested.connect(self.open)
+        window.reading_requested.connect(self.read)
         panel = window.patients
         panel.patient_chosen.connect(self.show)
         panel.close_requested.connect(self.close)
@@ -68,10 +69,13 @@ class PatientDesk(QObject):
 
     def open(self, path: Path) -> None:
         """Read a patient's file beside the window, and show it over the population's average."""
+        self.read(Reading(path.absolute()))
+
+    def read(self, reading: Reading) -> None:
+        """The same in a given way."""
         if self._controller.state.atlas is None:
             self._window.show_error("Open an atlas first; a scan is fitted to it.")
             return
-        reading = Reading(path.absolute())
         self._read(Order(next(self._keys), reading, self._known_of(reading)))
 
     def show(self, key: int | None) -> None:

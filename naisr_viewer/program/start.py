@@ -6,6 +6,7 @@ Qt is imported when it is needed, so that the command line answers at once.
 from __future__ import annotations
 
 import gc
+import locale
 import os
 import signal
 import sys
@@ -28,7 +29,11 @@ if TYPE_CHECKING:
 
     from naisr_viewer.control.controller import Controller
     from naisr_viewer.state.atlas_card import AtlasCard
+    from naisr_viewer.state.patients import Reading
     from naisr_viewer.views.main_window import MainWindow
+
+MOST_LISTED = 8
+"""Labels in a message."""
 
 
 @dataclass(frozen=True)
@@ -40,12 +45,21 @@ class First:
         card: of that atlas, where the engine has opened it already.
         values: real covariate values by name, then; the others are at their mean.
         scan: a patient's file to open.
+        label: which label of it, where it is a volume.
     """
 
     path: Path
     card: AtlasCard | None = None
     values: Mapping[str, float] = field(default_factory=dict)
     scan: Path | None = None
+    label: str | None = None
+
+    @property
+    def reading(self) -> Reading | None:
+        """The scan as it is asked for."""
+        from naisr_viewer.state.patients import Reading
+
+        return None if self.scan is None else Reading(self.scan.absolute(), self.label)
 
 
 def make_engine(device: str) -> Engine:
@@ -92,11 +106,15 @@ def make_window(engine: Engine, settings_file: Path | None = None) -> tuple[Main
 
 
 def make_application() -> QApplication:
-    """The one application object, styled alike on every platform."""
+    """The one application object, styled alike on every platform.
+
+    Qt takes over the user's locale, decimal comma included, and every C library in the process would follow.
+    """
     from PySide6.QtWidgets import QApplication
 
     app = QApplication.instance() or QApplication(["naisr-viewer"])
     assert isinstance(app, QApplication)
+    locale.setlocale(locale.LC_NUMERIC, "C")
     app.setApplicationName("naisr-viewer")
     app.setStyle("Fusion")
     return app
@@ -111,9 +129,9 @@ def attended(engine: Engine, first: First, pixels: tuple[int, int]) -> int:
     app = make_application()
     window, controller = make_window(engine)
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # so that Ctrl+C in the terminal ends the program
-    if (scan := first.scan) is not None:
+    if (reading := first.reading) is not None:
         once = Qt.ConnectionType.SingleShotConnection
-        controller.refinement.settled.connect(lambda: window.scan_requested.emit(scan), once)
+        controller.refinement.settled.connect(lambda: window.reading_requested.emit(reading), once)
     show(window, controller, first, pixels)
     return app.exec()
 
@@ -165,19 +183,38 @@ def unattended(
     from naisr_viewer.program import headless
 
     assert first.card is not None
+    require_one_label(engine, first.reading)
     ensure_display(pixels)
     with own_window(engine) as (window, controller):
         window.resize(*pixels)
         window.show()
         controller.show_atlas(first.card, first.values)
-        if first.scan is not None:
+        if first.reading is not None:
             headless.finish(window, controller)
-            window.scan_requested.emit(first.scan)
+            window.reading_requested.emit(first.reading)
         if screenshot is not None:
             headless.take_screenshot(window, controller, screenshot)
         if demo is not None:
             headless.run_demo(window, controller, demo)
     return 0
+
+
+def require_one_label(engine: Engine, reading: Reading | None) -> None:
+    """Refuse a volume of several labels of which none is chosen, where nobody can be asked.
+
+    Raises:
+        InputError: naming the labels.
+    """
+    from naisr_viewer.engine.clinic import Clinic
+
+    found = None if reading is None else Clinic(engine).labels(reading)
+    if found is not None:
+        listed = ", ".join(title for _, title in found.titles[:MOST_LISTED])
+        more = len(found.titles) - MOST_LISTED
+        raise InputError(
+            f"{found.reading.path.name} has {len(found.titles)} labels ({listed}"
+            f"{f' and {more} more' if more > 0 else ''}); choose one with --label"
+        )
 
 
 @contextmanager

@@ -22,14 +22,14 @@ class Reading:
 
     Attributes:
         path: a mesh, whole or in part, a label volume or a cloud of points.
-        label: which label of a volume; None where there is only one.
+        label: which label of a volume, its number or its name; None where there is only one.
         scale: millimetres per unit of the file; None to guess where the size is implausible.
         align: how it is moved to the atlas.
         landmarks: a CSV name,x,y,z in the coordinates of the file; for ``landmarks``.
     """
 
     path: Path
-    label: int | None = None
+    label: int | str | None = None
     scale: float | None = None
     align: Method = "none"
     landmarks: Path | None = None
@@ -41,11 +41,11 @@ class Labels:
 
     Attributes:
         reading: the file, still without a label.
-        titles: number and description of each label.
+        titles: what :class:`Reading` calls each label, and its description.
     """
 
     reading: Reading
-    titles: tuple[tuple[int, str], ...]
+    titles: tuple[tuple[int | str, str], ...]
 
 
 @dataclass(frozen=True, eq=False)

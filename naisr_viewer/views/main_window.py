@@ -53,6 +53,9 @@ class MainWindow(QMainWindow):
 
     open_requested = Signal(Path)  # an atlas was chosen, dropped or picked from the recent ones
     scan_requested = Signal(Path)  # a patient's file was chosen or dropped
+    reading_requested = Signal(
+        object
+    )  # a Reading: a patient's file and how to read it, from the command line
     export_requested = Signal(object)  # an ExportChoice from the dialog
     screenshot_requested = Signal(Path)  # where the picture shall go
     undo_requested = Signal()  # Edit > Undo
@@ -209,7 +212,7 @@ class MainWindow(QMainWindow):
         """Whether files that are there already may be replaced."""
         return ask_replace(self, files)
 
-    def ask_label(self, labels: Labels) -> int | None:
+    def ask_label(self, labels: Labels) -> int | str | None:
         """Which label of a volume; None when nobody chose."""
         return ask_label(self, labels)
 

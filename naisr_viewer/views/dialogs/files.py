@@ -11,7 +11,21 @@ from naisr_viewer.state.explorer import ExplorerState
 
 ATLAS_ENDING = ".safetensors"
 ATLAS_FILTER = f"Atlas (*{ATLAS_ENDING});;All files (*)"
-SCAN_ENDINGS = ("stl", "ply", "obj", "vtk", "vtp", "glb", "nii", "nii.gz", "nrrd", "csv", "txt", "xyz")
+SCAN_ENDINGS = (
+    "stl",
+    "ply",
+    "obj",
+    "vtk",
+    "vtp",
+    "glb",
+    "nii",
+    "nii.gz",
+    "nrrd",
+    "nhdr",
+    "csv",
+    "txt",
+    "xyz",
+)
 """Meshes, label volumes and text files of points that can be opened as a scan."""
 
 

@@ -23,16 +23,15 @@ class LabelDialog(QDialog):
         question.setWordWrap(True)
         self.choice = QComboBox(self)
         self.choice.setAccessibleName("Label")
-        for number, title in labels.titles:
-            self.choice.addItem(title, number)
+        self.choice.addItems([title for _, title in labels.titles])
         column = column_in(self)
         for widget in (question, self.choice, buttons_of(self, "Open")):
             column.addWidget(widget)
 
 
-def ask_label(parent: QWidget, labels: Labels) -> int | None:
+def ask_label(parent: QWidget, labels: Labels) -> int | str | None:
     """Which label of a volume is the shape, or None when the question was cancelled."""
     dialog = LabelDialog(labels, parent)
     accepted = dialog.exec() == QDialog.DialogCode.Accepted
     dialog.deleteLater()
-    return int(dialog.choice.currentData()) if accepted else None
+    return labels.titles[dialog.choice.currentIndex()][0] if accepted else None
