@@ -10,8 +10,10 @@ import sys
 import textwrap
 from pathlib import Path
 
+import nrrd
+import numpy as np
 import pytest
-from eggs import egg
+from eggs import egg, label_volume
 from PySide6.QtGui import QImage
 
 from naisr_model import __version__
@@ -157,6 +159,54 @@ def test_a_scan_is_opened_at_once(egg_atlas, tmp_path):
     arguments[2] = str(tmp_path / "none.ply")
     done = run(f"import sys; from naisr_viewer import app; sys.exit(app.main({arguments!r}))", *DISPLAY)
     assert done.returncode == 2 and "none.ply" in done.stderr and done.stderr.count("\n") == 1
+
+
+def test_nobody_is_asked_for_a_label_where_nobody_sits(capsys, engine, atlas_file, tmp_path, monkeypatch):
+    monkeypatch.setattr(start, "make_engine", lambda _: engine)
+    scan, picture = label_volume(tmp_path / "scan.nrrd"), tmp_path / "picture.png"
+    for task in ("--screenshot", "--demo"):
+        assert app.main([str(atlas_file), "--scan", str(scan), task, str(picture)]) == 2
+        error = capsys.readouterr().err
+        assert error.count("\n") == 1
+        assert "scan.nrrd has 2 labels (1: 0.064 cm³, 2 'egg': 58.9 cm³); choose one with --label" in error
+    assert app.main([str(atlas_file), "--label", "2", "--screenshot", str(picture)]) == 2
+    assert "give --scan FILE too" in capsys.readouterr().err
+    assert not picture.exists()
+
+
+@pytest.mark.skipif(shutil.which("Xvfb") is None, reason="needs a virtual display")
+@pytest.mark.parametrize(("label", "complaint"), [("egg", ""), ("nose", "has no label nose; it has 1: ")])
+def test_the_label_of_a_scan_is_chosen_on_the_command_line(egg_atlas, tmp_path, label, complaint):
+    scan, picture = label_volume(tmp_path / "scan.nrrd"), tmp_path / "picture.png"
+    arguments = [str(egg_atlas), "--scan", str(scan), "--label", label, "--screenshot", str(picture)]
+    done = run(f"import sys; from naisr_viewer import app; sys.exit(app.main({arguments!r}))", *DISPLAY)
+    assert done.returncode == (2 if complaint else 0) and complaint in done.stderr
+    assert picture.exists() is not bool(complaint)
+
+
+@pytest.mark.skipif(shutil.which("Xvfb") is None, reason="needs a virtual display")
+def test_numbers_are_the_same_under_a_locale_with_a_decimal_comma(tmp_path):
+    scan = tmp_path / "scan.nrrd"
+    steps = {"space": "LPS", "space directions": np.diag([1.5, 1.5, 2.5]), "space origin": np.full(3, 0.5)}
+    nrrd.write(str(scan), np.ones((4, 4, 4), np.uint8), steps)
+    # A locale of this test's own where the machine has what it takes; without one, C is what is left.
+    if shutil.which("localedef"):
+        make = ["localedef", "-i", "de_DE", "-f", "UTF-8", str(tmp_path / "de_DE.UTF-8")]
+        subprocess.run(make, capture_output=True, check=False)
+    done = run(
+        f"""
+        import locale, os
+        os.environ |= {{"LC_ALL": "de_DE.UTF-8", "LOCPATH": {str(tmp_path)!r}}}
+        from naisr_viewer.program import display, start
+        display.ensure_display((640, 480))
+        application = start.make_application()
+        from naisr_model.data.volumes import read_labels
+        volume = read_labels({str(scan)!r})
+        print(locale.setlocale(locale.LC_NUMERIC), volume.spacing_mm.tolist(), volume.to_lps_mm[0, 3])
+        """,
+        *DISPLAY,
+    )
+    assert done.stdout == "C [1.5, 1.5, 2.5] 0.5\n", done.stderr
 
 
 @pytest.mark.skipif(shutil.which("Xvfb") is None, reason="needs a virtual display")

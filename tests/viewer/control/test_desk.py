@@ -19,6 +19,7 @@ from PySide6.QtWidgets import QFileDialog, QWidget
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.program.start import make_window
 from naisr_viewer.state.layouts import FULL_SHAPE, TEMPLATE, Layout, Panel
+from naisr_viewer.state.patients import Reading
 from naisr_viewer.state.requests import ExportChoice
 from naisr_viewer.views import main_window
 from naisr_viewer.words.numbers import gained, volume
@@ -295,6 +296,10 @@ def test_a_label_is_chosen(ready, qtbot, tmp_path, monkeypatch):
     settle(qtbot, controller)
     assert asked == [[1, 2]]
     truth = 4 / 3 * np.pi * 18 * 17 * 22 / 1000
+    assert controller.state.shown.scan.volume_cm3 == pytest.approx(truth, rel=0.05)
+    window.reading_requested.emit(Reading(path, label="2"))
+    settle(qtbot, controller)
+    assert asked == [[1, 2]] and len(controller.state.patients) == 2
     assert controller.state.shown.scan.volume_cm3 == pytest.approx(truth, rel=0.05)
 
 

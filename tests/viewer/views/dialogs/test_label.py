@@ -15,7 +15,9 @@ from naisr_viewer.views.dialogs.label import LabelDialog, ask_label
 def test_a_label_is_chosen_by_its_title(qtbot):
     parent = QWidget()
     qtbot.addWidget(parent)
-    labels = Labels(Reading(Path("/scans/p01.nii.gz")), ((1, "1: 3.2 cm³"), (4, "4 'airway': 41.9 cm³")))
+    labels = Labels(
+        Reading(Path("/scans/p01.nii.gz")), ((1, "1: 3.2 cm³"), ("airway", "1 'airway': 41.9 cm³"))
+    )
 
     def answer(key: Qt.Key) -> None:
         dialog = QApplication.activeModalWidget()
@@ -26,6 +28,6 @@ def test_a_label_is_chosen_by_its_title(qtbot):
         QTest.keyClick(dialog, key)
 
     QTimer.singleShot(0, lambda: answer(Qt.Key.Key_Return))
-    assert ask_label(parent, labels) == 4
+    assert ask_label(parent, labels) == "airway"
     QTimer.singleShot(0, lambda: answer(Qt.Key.Key_Escape))
     assert ask_label(parent, labels) is None
