@@ -98,7 +98,7 @@ def read_labels(path: str | Path) -> LabelVolume:
         LabelVolume(
             _whole_numbers(path.name, voxels, image),
             image.to_lps_mm,
-            _names(image.metadata, layer),
+            _names(image.metadata, layer, len(image.voxels)),
             image.remarks,
         )
         for layer, voxels in enumerate(image.voxels)
@@ -144,14 +144,16 @@ def _fractions(name: str, voxels: NDArray[Any], image: Image) -> InputError:
     return InputError(f"{values}, so it is {kinds}; threshold or segment it and save whole-number labels")
 
 
-def _names(metadata: Mapping[str, str], layer: int) -> dict[int, str]:
-    """What 3D Slicer writes into the header of a segmentation."""
+def _names(metadata: Mapping[str, str], layer: int, layers: int) -> dict[int, str]:
+    """What 3D Slicer writes into the header of a segmentation; once it gave every segment a layer of ones."""
     names = {}
     for key, name in metadata.items():
-        segment = re.fullmatch(r"(Segment[0-9]+)_Name", key)
-        value = metadata.get(f"{segment[1]}_LabelValue", "") if segment else ""
-        if segment and _is_whole(value) and metadata.get(f"{segment[1]}_Layer", "0") == str(layer):
-            names[int(value)] = name
+        if segment := re.fullmatch(r"Segment([0-9]+)_Name", key):
+            number = segment[1]
+            value = metadata.get(f"Segment{number}_LabelValue", "1" if layers > 1 else "")
+            where = metadata.get(f"Segment{number}_Layer", number if layers > 1 else "0")
+            if _is_whole(value) and where == str(layer):
+                names[int(value)] = name
     return names
 
 
@@ -261,7 +263,7 @@ def _only(name: str, entries: Sequence[_Entry]) -> tuple[LabelVolume, int]:
     first = entries[0]
     if len(entries) > 1 or first.label < 0:
         count = f"{len(entries)} labels" if len(entries) > 1 else "a negative label alone"
-        raise InputError(f"{name} has {count} ({_listed(entries)}); choose one of them")
+        raise InputError(f"{name} has {count} ({_listed(entries)}); choose one with --label")
     return first.volume, first.label
 
 
@@ -269,7 +271,7 @@ def _scan(name: str, entries: Sequence[_Entry]) -> InputError:
     low, high = min(entry.label for entry in entries), max(entry.label for entry in entries)
     return InputError(
         f"{name} holds {len(entries):,} values from {low} to {high}, so it is a scan and no labels; "
-        "segment it, or name the label that is meant"
+        "segment it, or name the label that is meant with --label"
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
@@ -39,7 +40,7 @@ class Clinic:
         self._intakes: WeakKeyDictionary[Scan, Intake] = WeakKeyDictionary()
 
     def labels(self, reading: Reading) -> Labels | None:
-        """What to choose from, where a label volume has several labels and none is chosen.
+        """What to choose from, where none is chosen and it is not clear which label is meant.
 
         Raises:
             InputError: when a label volume cannot be used.
@@ -47,7 +48,7 @@ class Clinic:
         from naisr_model.patients import intake
 
         titles = intake.labels(reading.path) if reading.label is None else None
-        return Labels(reading, tuple(titles.items())) if titles and len(titles) > 1 else None
+        return Labels(reading, tuple(titles.items())) if titles and not _is_clear(titles) else None
 
     def read(self, atlas: Path, reading: Reading, known: Named, progress: Progress = SILENT) -> Scan:
         """Read a patient's file as asked and bring it into the frame of an open atlas.
@@ -107,6 +108,12 @@ class Clinic:
     def forget(self, fit: Fitted) -> None:
         """A fit that nobody asks for any more."""
         self._engine.dismiss(fit.person)
+
+
+def _is_clear(titles: Mapping[int | str, str]) -> bool:
+    """A negative label alone may as well be what is outside of the shape."""
+    (first, *others) = titles
+    return not others and not (isinstance(first, int) and first < 0)
 
 
 def _scan(taken: Intake) -> Scan:

@@ -209,12 +209,10 @@ def require_one_label(engine: Engine, reading: Reading | None) -> None:
 
     found = None if reading is None else Clinic(engine).labels(reading)
     if found is not None:
-        listed = ", ".join(title for _, title in found.titles[:MOST_LISTED])
-        more = len(found.titles) - MOST_LISTED
-        raise InputError(
-            f"{found.reading.path.name} has {len(found.titles)} labels ({listed}"
-            f"{f' and {more} more' if more > 0 else ''}); choose one with --label"
-        )
+        count, listed = len(found.titles), ", ".join(title for _, title in found.titles[:MOST_LISTED])
+        more = f" and {count - MOST_LISTED} more" if count > MOST_LISTED else ""
+        labels = f"{count} labels" if count > 1 else "a negative label alone"
+        raise InputError(f"{found.reading.path.name} has {labels} ({listed}{more}); choose one with --label")
 
 
 @contextmanager

@@ -186,11 +186,14 @@ def squared(
 
 def shift(one: NDArray[np.float64], other: NDArray[np.float64], counts: Sequence[int]) -> float:
     """By how many voxels of ``one``, which is invertible, two matrices place a corner of the image apart."""
-    corners = np.stack(np.meshgrid(*[[0, count - 1] for count in counts], [1], indexing="ij"), -1).reshape(
-        -1, 4
-    )
-    apart = np.linalg.inv(one)[:3, :3] @ ((other - one) @ corners.T)[:3]
-    return float(np.abs(apart).max())
+    return float(np.abs(np.linalg.inv(one)[:3, :3] @ apart(one, other, counts)).max())
+
+
+def apart(one: NDArray[np.float64], other: NDArray[np.float64], counts: Sequence[int]) -> NDArray[np.float64]:
+    """From where one matrix places the corners of the image to where another does, ``[3, 8]``."""
+    ends = [[0, count - 1] for count in counts]
+    corners = np.stack(np.meshgrid(*ends, [1], indexing="ij"), axis=-1).reshape(-1, 4)
+    return ((other - one) @ corners.T)[:3]
 
 
 def unplaced() -> Remark:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from naisr_model.data.images.base import (
     MOST_SHIFT,
     Image,
+    apart,
     cut_off,
     require_one_value,
     require_size,
@@ -151,10 +152,10 @@ def _position_remarks(header: Any, used: NDArray[np.float64], counts: list[int])
     other = _qform(header) if _is_coded(header, "qform") else used
     if other is None or shift(used, other, counts) <= MOST_SHIFT:
         return ()
-    corner = np.linalg.norm((other - used)[:3] @ [*(np.array(counts) - 1) / 2, 1]) * _unit_mm(header)[0, 0]
+    most_mm = np.linalg.norm(apart(used, other, counts), axis=0).max() * _unit_mm(header)[0, 0]
     sentence = (
-        "the file places the image in two ways (sform and qform) that differ, in the middle of the image by "
-        f"{corner:.3g} mm; the sform is used"
+        f"the file places the image in two ways, which differ by up to {most_mm:.3g} mm (sform and qform); "
+        "the sform is used"
     )
     return (Remark("look", "orientation", sentence, "check place, size and sides against the scan"),)
 

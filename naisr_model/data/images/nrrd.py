@@ -181,7 +181,7 @@ def _unspaced(name: str) -> InputError:
 
 def _is_layered(metadata: Mapping[str, str]) -> bool:
     """Whether it is a segmentation of 3D Slicer, whose segments may overlap and then lie in layers."""
-    return any(re.fullmatch(r"Segment\d+_Layer", key) for key in metadata)
+    return any(re.fullmatch(r"Segment\d+_(Layer|Name)", key) for key in metadata)
 
 
 def _require_axes(name: str, counts: Sequence[int], spatial: Sequence[int], *, is_layered: bool) -> None:

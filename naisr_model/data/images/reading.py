@@ -13,7 +13,7 @@ from naisr_model.errors import InputError
 FOREIGN = {
     rb"(?s).{344}ni1|.{4}ni2": "one half of a pair of header and image; save it as one file, .nii or .nii.gz",
     rb"(?s).{128}DICM": "a DICOM file; convert the series to NIfTI or NRRD",
-    rb"\s*(ObjectType|NDims|Comment)\s*=": "a MetaImage; save it as NIfTI or NRRD",
+    rb"\s*(ObjectType|NDims)\s*=": "a MetaImage; save it as NIfTI or NRRD",
 }
 """Images in formats that are not read, by how they begin, and what to do with them."""
 

@@ -16,9 +16,8 @@ class LabelDialog(QDialog):
         super().__init__(parent)
         self.setWindowTitle("Choose a label")
         self.setMinimumWidth(380)
-        question = QLabel(
-            f"{labels.reading.path.name} holds {len(labels.titles)} labels. Which is the shape?"
-        )
+        count = f"{len(labels.titles)} labels" if len(labels.titles) > 1 else "a negative label alone"
+        question = QLabel(f"{labels.reading.path.name} holds {count}. Which is the shape?")
         question.setTextFormat(Qt.TextFormat.PlainText)
         question.setWordWrap(True)
         self.choice = QComboBox(self)

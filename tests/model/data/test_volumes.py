@@ -336,6 +336,14 @@ def test_overlapping_segments_are_chosen_by_name(tmp_path):
         read_patient(path)
 
 
+def test_layers_of_older_segmentations_are_named_in_their_order(tmp_path):
+    path = layered(tmp_path, ("airway", 1, 0), ("tongue", 1, 1))
+    content = path.read_bytes().replace(b"_LabelValue:=1", b"_Color:=1").replace(b"_Layer:=", b"_Tags:=")
+    path.write_bytes(content)
+    assert read_patient(path, "airway").mesh_mm.volume == pytest.approx(8000, rel=0.02)
+    assert read_patient(path, "tongue").mesh_mm.volume == pytest.approx(1728, rel=0.02)
+
+
 @pytest.mark.parametrize("names", [("airway", "tongue"), ("same", "same"), ("1", "2"), ("", "")])
 def test_every_title_leads_to_its_own_label(tmp_path, names):
     path = layered(tmp_path, (names[0], 1, 0), (names[1], 1, 1))

@@ -232,7 +232,7 @@ def test_the_sform_is_used_and_a_qform_that_differs_is_told(tmp_path, kind):
     assert "orientation" in {remark.topic for remark in read.remarks}
     assert any("differ" in remark.sentence for remark in read.remarks)
     if kind == "shift":
-        assert "by 30 mm" in read.remarks[0].sentence
+        assert "by up to 30 mm" in read.remarks[0].sentence
 
 
 def test_the_qform_is_used_where_there_is_no_sform(tmp_path):
