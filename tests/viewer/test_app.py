@@ -169,6 +169,10 @@ def test_nobody_is_asked_for_a_label_where_nobody_sits(capsys, engine, atlas_fil
         error = capsys.readouterr().err
         assert error.count("\n") == 1
         assert "scan.nrrd has 2 labels (1: 0.064 cm³, 2 'egg': 58.9 cm³); choose one with --label" in error
+    steps = {"space": "LPS", "space directions": np.eye(3), "space origin": np.zeros(3)}
+    nrrd.write(str(scan), np.pad(np.full((9, 9, 9), -1, np.int16), 1), steps)
+    assert app.main([str(atlas_file), "--scan", str(scan), "--screenshot", str(picture)]) == 2
+    assert "has a negative label alone (-1: 0.729 cm³); choose one with --label" in capsys.readouterr().err
     assert app.main([str(atlas_file), "--label", "2", "--screenshot", str(picture)]) == 2
     assert "give --scan FILE too" in capsys.readouterr().err
     assert not picture.exists()

@@ -22,6 +22,7 @@ MOST_BYTES = 1 << 30
 MOST_SHIFT = 0.1
 """Voxels: how far straightening its axes may move one, and two matrices that say the same may differ."""
 
+_BEYOND = 1e12
 _BLOCK = 1 << 20
 _HEADROOM = 1 << 24
 _GZIP = b"\x1f\x8b"
@@ -168,11 +169,11 @@ def squared(
     Raises:
         InputError: when a number is not finite, an axis has no length or the axes are sheared.
     """
-    if not np.isfinite(matrix).all():
+    if not (np.abs(matrix) < _BEYOND).all():  # nor NaN
         raise InputError(f"{name} has axes that are not finite numbers; export it again")
     matrix = to_lps_mm @ matrix
     steps = np.linalg.norm(matrix[:3, :3], axis=0)
-    if not (steps > 0).all() or not np.isfinite(steps).all():
+    if (steps < 1 / _BEYOND).any():
         size = " x ".join(f"{step:g}" for step in steps)
         raise InputError(f"{name} has voxels of {size} mm; set the spacing and export it again")
     left, _, right = np.linalg.svd(matrix[:3, :3] / steps)
@@ -194,6 +195,14 @@ def apart(one: NDArray[np.float64], other: NDArray[np.float64], counts: Sequence
     ends = [[0, count - 1] for count in counts]
     corners = np.stack(np.meshgrid(*ends, [1], indexing="ij"), axis=-1).reshape(-1, 4)
     return ((other - one) @ corners.T)[:3]
+
+
+def surplus(count: int) -> tuple[Remark, ...]:
+    """For a file with more bytes than it announces, which may be what is left of a size that is wrong."""
+    if count <= 0:
+        return ()
+    sentence = f"the file holds {count:,} bytes or more beyond the voxels that it announces"
+    return (Remark("look", "surplus", sentence, "compare the volume with the one you expect"),)
 
 
 def unplaced() -> Remark:

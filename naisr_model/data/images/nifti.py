@@ -21,6 +21,7 @@ from naisr_model.data.images.base import (
     require_volume,
     shift,
     squared,
+    surplus,
     unplaced,
 )
 from naisr_model.data.remarks import Remark
@@ -50,11 +51,11 @@ def read_nifti(name: str, content: bytes) -> Image:
     require_volume(name, counts)
     counts = counts[:3]
     slope, intercept = _scale(name, header)
-    voxels = _voxels(name, content, header, counts, dtype)
+    voxels, left = _voxels(name, content, header, counts, dtype)
     ras = _matrix(name, header)
     lps_mm = squared(name, _unit_mm(header) @ RAS_TO_LPS, ras, counts)
-    remarks = (*_position_remarks(header, ras, counts), *_spacing_remarks(header, ras))
-    return Image(voxels[None], lps_mm, {}, remarks, slope, intercept)
+    placed = (*_position_remarks(header, ras, counts), *_spacing_remarks(header, ras))
+    return Image(voxels[None], lps_mm, {}, (*placed, *surplus(left)), slope, intercept)
 
 
 def _header(name: str, content: bytes) -> Any:
@@ -82,7 +83,7 @@ def _dtype(name: str, header: Any) -> np.dtype:
 
     try:
         dtype = header.get_data_dtype()
-    except HeaderDataError as error:
+    except (HeaderDataError, KeyError) as error:
         raise InputError(f"{name} has voxels of an unknown type ({error}); export it again") from error
     if dtype.names or dtype.kind not in "iuf":
         raise InputError(f"{name} holds colours or complex numbers; save whole-number labels")
@@ -99,14 +100,18 @@ def _scale(name: str, header: Any) -> tuple[float, float]:
     return (1.0, 0.0) if slope is None else (slope, intercept)
 
 
-def _voxels(name: str, content: bytes, header: Any, counts: list[int], dtype: np.dtype) -> NDArray[Any]:
-    first, least = float(header["vox_offset"]), int(header["sizeof_hdr"]) + 4
+def _voxels(
+    name: str, content: bytes, header: Any, counts: list[int], dtype: np.dtype
+) -> tuple[NDArray[Any], int]:
+    """The voxels, and how many bytes follow them."""
+    first, least = float(header["vox_offset"]), len(header.binaryblock) + 4
     if not 0 <= first < math.inf:
         raise InputError(f"{name} does not say where its voxels begin; it is damaged, export it again")
     offset, count = max(int(first), least), math.prod(counts)
-    if len(content) - offset < count * dtype.itemsize:
+    left = len(content) - offset - count * dtype.itemsize
+    if left < 0:
         raise cut_off(name, count * dtype.itemsize, len(content) - offset)
-    return np.frombuffer(content, dtype, count, offset).reshape(counts, order="F")
+    return np.frombuffer(content, dtype, count, offset).reshape(counts, order="F"), left
 
 
 def _matrix(name: str, header: Any) -> NDArray[np.float64]:

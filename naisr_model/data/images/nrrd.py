@@ -20,6 +20,7 @@ from naisr_model.data.images.base import (
     require_size,
     require_volume,
     squared,
+    surplus,
     unpacked,
     unplaced,
 )
@@ -93,7 +94,7 @@ def read_nrrd(path: Path, content: bytes) -> Image:
     directions, is_placed = _directions(path.name, header, len(counts))
     spatial = [axis for axis, direction in enumerate(directions) if not np.isnan(direction).all()]
     _require_axes(path.name, counts, spatial, is_layered=_is_layered(metadata))
-    voxels = _voxels(path, header, counts, data)
+    voxels, left = _voxels(path, header, counts, data)
     layers = [axis for axis in range(len(counts)) if axis not in spatial]
     size = [counts[axis] for axis in spatial]
     voxels = voxels.transpose(layers + spatial).reshape(-1, *size, order="A")
@@ -102,7 +103,7 @@ def read_nrrd(path: Path, content: bytes) -> Image:
     matrix[:3, 3], origin_remarks = _origin(header)
     lps_mm = squared(path.name, _to_lps_mm(path.name, header), matrix, size)
     unknown = () if is_placed and _word(header, "space") in SIGNS_TO_LPS else (unplaced(),)
-    return Image(voxels, lps_mm, metadata, (*unknown, *origin_remarks))
+    return Image(voxels, lps_mm, metadata, (*unknown, *origin_remarks, *surplus(left)))
 
 
 def _header(name: str, content: bytes) -> tuple[dict[str, Any], dict[str, str]]:
@@ -230,20 +231,25 @@ def _singular(unit: str) -> str:
 # --- voxels -------------------------------------------------------------------------------------
 
 
-def _voxels(path: Path, header: Mapping[str, Any], counts: Sequence[int], data: bytes) -> NDArray[Any]:
+def _voxels(
+    path: Path, header: Mapping[str, Any], counts: Sequence[int], data: bytes
+) -> tuple[NDArray[Any], int]:
+    """The voxels, and how many bytes at least follow them."""
     dtype, count = _dtype(path.name, header), math.prod(counts)
     name, data = _apart(path, header, data)
     encoding = ENCODINGS[_word(header, "encoding")]
     first = _skip(name, header, "byte skip", -1)
     require_size(path.name, counts, 1 if encoding == "text" else dtype.itemsize)
-    most = count * dtype.itemsize + max(first, 0) if first >= 0 else MOST_BYTES
+    most = MOST_BYTES if first < 0 else count * dtype.itemsize + first + 1
     data = _plain(name, data, _skip(name, header, "line skip", 0), encoding, most)
     if encoding == "text":
-        return _parsed(name, data[max(first, 0) :], count).reshape(counts, order="F")
+        numbers = _parsed(name, data[max(first, 0) :], count)
+        return numbers[:count].reshape(counts, order="F"), len(numbers) - count
     first = len(data) - count * dtype.itemsize if first < 0 else first
-    if first < 0 or len(data) - first < count * dtype.itemsize:
+    left = len(data) - first - count * dtype.itemsize
+    if first < 0 or left < 0:
         raise cut_off(name, count * dtype.itemsize, len(data) - max(first, 0))
-    return np.frombuffer(data, dtype, count, first).reshape(counts, order="F")
+    return np.frombuffer(data, dtype, count, first).reshape(counts, order="F"), left
 
 
 def _plain(name: str, data: bytes, lines: int, encoding: str, most: int) -> bytes:
@@ -266,7 +272,7 @@ def _parsed(name: str, data: bytes, count: int) -> NDArray[np.float64]:
         raise InputError(
             f"{name} is cut off: it announces {count:,} voxels and has {len(numbers):,}; copy it again"
         )
-    return numbers[:count]
+    return numbers
 
 
 def _dtype(name: str, header: Mapping[str, Any]) -> np.dtype:

@@ -130,6 +130,18 @@ def test_what_follows_a_gzip_stream_is_left_out(tmp_path, after):
     require_block(read_image(path))
 
 
+def test_more_than_is_announced_is_told(tmp_path):
+    path = tmp_path / "a.nii"
+    path.write_bytes(header_of().to_bytes() + b"surplus")
+    packed = nrrd_file(
+        tmp_path / "b.nrrd", encoding="gzip", data=gzip.compress(block().tobytes("F") + b"surplus")
+    )
+    for each in (path, nrrd_file(tmp_path / "a.nrrd", data=block().tobytes("F") + b"surplus"), packed):
+        image = read_image(each)
+        require_block(image)
+        assert [remark.topic for remark in image.remarks] == ["surplus"]
+
+
 def test_gzip_in_pieces_is_one_file(tmp_path):
     content = header_of().to_bytes()
     (tmp_path / "a.nii.gz").write_bytes(gzip.compress(content[:1000]) + gzip.compress(content[1000:]))
@@ -331,6 +343,10 @@ REFUSED = {
     "flat space": ({"space_directions": "(1,0) (0,1) (1,1)"}, "not three-dimensional"),
     "words": ({"space_directions": "(1;0;0) (0;1;0) (0;0;1)"}, "damaged header"),
     "sizes": ({"sizes": "20 24"}, "does not say how many voxels"),
+    "beyond measure": (
+        {"space_directions": "(1e200,0,0) (0,1,0) (0,0,1)"},
+        "axes that are not finite numbers",
+    ),
     "huge": ({"sizes": "99999999 99999999 99999999"}, "more than 1,024 MB; crop"),
     "beyond": ({"sizes": "99999999999999999999 3 3"}, "it is damaged, export it again"),
     "negative": ({"sizes": "-20 24 16"}, "it is damaged, export it again"),
@@ -448,6 +464,13 @@ def test_a_small_file_cannot_fill_the_memory(tmp_path):
 def test_dimensions_that_are_none_are_refused(tmp_path, dim):
     path = nifti(header_of(), tmp_path / "a.nii", dim=[*dim, 1, 1, 1, 1])
     with pytest.raises(InputError, match=r"a\.nii .*(damaged|cut off)"):
+        read_image(path)
+
+
+@pytest.mark.parametrize("code", [0, 1, 57, 10512])
+def test_a_type_that_is_none_is_refused(tmp_path, code):
+    path = nifti(header_of(), tmp_path / "a.nii", datatype=code)
+    with pytest.raises(InputError, match=r"unknown type|colours or complex"):
         read_image(path)
 
 
