@@ -110,7 +110,7 @@ def _header(name: str, content: bytes) -> tuple[dict[str, Any], dict[str, str]]:
     """The fields that matter, and the key/value pairs."""
     import nrrd
 
-    magic, *lines = _decoded(content).splitlines()
+    magic, *lines = re.split(r"\r?\n", _decoded(content))
     pairs = [line.split(":=", 1) for line in lines if re.match(r"[^:#]+:=", line)]
     fields = [_field(line) for line in lines if re.match(r"[^:#]+:(?!=)", line)]
     kept = [line for line in fields if line.split(":")[0] in FIELDS]
