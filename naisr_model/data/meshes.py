@@ -13,7 +13,10 @@ import igl
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
+from naisr_model.data.remarks import Remark
 from naisr_model.errors import InputError
 
 READERS = {".stl", ".ply", ".obj", ".vtk", ".vtp", ".glb"}
@@ -195,11 +198,11 @@ def _winding(
     return np.asarray(igl.fast_winding_number(vertices, np.ascontiguousarray(faces), points))
 
 
-def check_mesh(mesh: trimesh.Trimesh) -> tuple[str, ...]:
+def check_mesh(mesh: trimesh.Trimesh) -> tuple[Remark, ...]:
     """Decide whether a repaired mesh bounds a body.
 
     Returns:
-        What is odd but bearable, one phrase each: open edges, several components.
+        What is odd but bearable: open edges, several components.
 
     Raises:
         InputError: when there are no faces, or the surface is flat or open.
@@ -217,15 +220,37 @@ def check_mesh(mesh: trimesh.Trimesh) -> tuple[str, ...]:
     return _oddities(faces)
 
 
-def _oddities(faces: NDArray[np.int64]) -> tuple[str, ...]:
+def _oddities(faces: NDArray[np.int64]) -> tuple[Remark, ...]:
     edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     _, uses = np.unique(edges, axis=0, return_counts=True)
     open_edges, components = int((uses == 1).sum()), igl.facet_components(faces)[0]
-    return tuple(
-        phrase
-        for phrase, applies in (
-            (f"{open_edges} open edges", open_edges > 0),
-            (f"{components} components", components > 1),
-        )
-        if applies
+    found = (
+        (Remark("look", "open", f"{open_edges} open edges"), open_edges > 0),
+        (Remark("look", "components", f"{components} components"), components > 1),
     )
+    return tuple(remark for remark, applies in found if applies)
+
+
+def hole_areas_mm2(mesh_mm: trimesh.Trimesh) -> NDArray[np.float64]:
+    """Area of each hole of a surface whose faces are wound alike, ``[holes]``.
+
+    The area vector of a rim is the sum of p x q / 2 over its directed edges.
+    """
+    edges, points = rim(mesh_mm), np.asarray(mesh_mm.vertices)
+    if not len(edges):
+        return np.zeros(0)
+    graph = coo_array((np.ones(len(edges)), edges.T), (len(points), len(points)))
+    hole = connected_components(graph)[1][edges[:, 0]]
+    points = points - points[edges].mean(axis=(0, 1))
+    vectors = np.cross(points[edges[:, 0]], points[edges[:, 1]]) / 2
+    areas = np.linalg.norm([np.bincount(hole, weights=column) for column in vectors.T], axis=0)
+    return areas[np.unique(hole)]
+
+
+def rim(mesh: trimesh.Trimesh) -> NDArray[np.int64]:
+    """The edge of an open surface: directed edges that no neighbour runs along the other way, ``[n, 2]``."""
+    edges = np.asarray(mesh.faces, np.int64)[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    keys = edges.min(axis=1) * len(mesh.vertices) + edges.max(axis=1)
+    _, index = np.unique(keys, return_inverse=True)
+    surplus = np.bincount(index, weights=np.where(edges[:, 0] < edges[:, 1], 1, -1))
+    return edges[surplus[index] != 0]

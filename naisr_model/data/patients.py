@@ -1,24 +1,24 @@
 """One patient's shape: reading it from any file, finding what is wrong with it, and setting that right.
 
-:func:`read_patient`, then :func:`repaired`, which also says what it did and what is left.
+:func:`read_patient`, then :func:`repaired`, whose result remembers what was done; :func:`check_patient` says
+what is left.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Container, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import igl
 import numpy as np
 import trimesh
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from naisr_model.data import meshes, volumes
+from naisr_model.data.remarks import Remark, gravest_first
 from naisr_model.errors import InputError
 from naisr_model.frames import BOX_MARGIN, Frame
 
@@ -48,7 +48,7 @@ class PatientShape:
             in the file.
         source: what was read, for example ``p01.nii.gz, label 2 'airway'``.
         space: ``LPS`` or ``RAS`` where the file says it, else empty.
-        remarks: what was odd about the file, a sentence each.
+        remarks: what was odd about the file, and what was repaired.
         from_file: 4x4, coordinates as they were read to those of ``mesh_mm``, by every repair and
             motion since; landmarks of the file go the same way.
         units_known: whether a person said how long a unit is, so that it is not guessed.
@@ -57,7 +57,7 @@ class PatientShape:
     mesh_mm: trimesh.Trimesh
     source: str = ""
     space: Literal["LPS", "RAS", ""] = ""
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[Remark, ...] = ()
     from_file: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
     units_known: bool = False
 
@@ -69,31 +69,12 @@ class PatientShape:
     @property
     def is_closed(self) -> bool:
         """Whether the surface bounds a body, so that its volume means something."""
-        return not self.is_cloud and not len(rim(self.mesh_mm))
+        return not self.is_cloud and not len(meshes.rim(self.mesh_mm))
 
     @property
     def volume_cm3(self) -> float | None:
         """What the surface encloses; None where it is open or a cloud of points."""
         return float(self.mesh_mm.volume) / 1000 if self.is_closed else None
-
-
-@dataclass(frozen=True)
-class Finding:
-    """Something about a patient that a fit would suffer from.
-
-    Attributes:
-        kind: an ``error`` makes a fit meaningless, a ``warning`` is to be known.
-        topic: one word for the kind of trouble, such as ``units``.
-        sentence: what is the matter.
-        remedy: what to do.
-        repair: does it, where the program can; None where a person must.
-    """
-
-    kind: Literal["error", "warning"]
-    topic: str
-    sentence: str
-    remedy: str
-    repair: Callable[[PatientShape], PatientShape] | None = field(default=None, compare=False, repr=False)
 
 
 # --- reading ------------------------------------------------------------------------------------
@@ -155,7 +136,8 @@ def _from_labels(path: Path, volume: volumes.LabelVolume, label: int | str | Non
     if chosen not in sizes_cm3:
         raise InputError(f"{path.name} has no label {label}; it has {listed}")
     surface = volumes.label_surface(volume, chosen)
-    remarks = (*volume.remarks, *_label_remarks(volume, chosen, surface, sizes_cm3[chosen]))
+    sentences = (*volume.remarks, *_label_remarks(volume, chosen, surface, sizes_cm3[chosen]))
+    remarks = tuple(Remark("look", "volume", sentence) for sentence in sentences)
     return PatientShape(surface, f"{path.name}, label {volumes.titled(volume, chosen)}", "LPS", remarks)
 
 
@@ -228,8 +210,16 @@ def _is_number(text: str) -> bool:
 # --- checking -----------------------------------------------------------------------------------
 
 
-def check_patient(patient: PatientShape, frame: Frame) -> tuple[Finding, ...]:
-    """Find what would spoil a fit, errors first.
+class _Fault(NamedTuple):
+    """A remark, what would set the matter right, and what is said once that is done."""
+
+    remark: Remark
+    repair: Callable[[PatientShape], PatientShape] | None = None
+    done: str = ""
+
+
+def check_patient(patient: PatientShape, frame: Frame) -> tuple[Remark, ...]:
+    """Find what would spoil a fit, what forbids one first.
 
     The position is judged too, so a scan is checked again after it was aligned.
 
@@ -237,49 +227,53 @@ def check_patient(patient: PatientShape, frame: Frame) -> tuple[Finding, ...]:
         patient: what was read.
         frame: that of the atlas; its box tells where the population's shapes lie and how large they are.
     """
+    return gravest_first(fault.remark for fault in _faults(patient, frame))
+
+
+def repaired(patient: PatientShape, frame: Frame) -> PatientShape:
+    """Set right what forbids a fit, where the program can; the result's remarks tell what was done."""
+    done: set[str] = set()
+    while fault := next(_mendable(patient, frame, done), None):
+        assert fault.repair is not None
+        told = Remark("fine", fault.remark.topic, fault.done)
+        patient = fault.repair(patient)
+        patient = replace(patient, remarks=(*patient.remarks, told))
+        done.add(told.topic)
+    return patient
+
+
+def _mendable(patient: PatientShape, frame: Frame, done: Container[str]) -> Iterator[_Fault]:
+    for fault in _faults(patient, frame):
+        if fault.remark.severity == "refuse" and fault.repair and fault.remark.topic not in done:
+            yield fault
+
+
+def _faults(patient: PatientShape, frame: Frame) -> list[_Fault]:
     if fatal := _unusable(patient):
-        return (fatal,)
+        return [_Fault(fatal)]
     units = _units(patient, frame)
-    position = None if units and units.kind == "error" else _position(patient, frame)
-    found = [units, position, _voxel_indices(patient), _space(patient)]
+    position = None if units and units.remark.severity == "refuse" else _position(patient, frame)
+    found = [units, *map(_unmended, (position, _voxel_indices(patient), _space(patient)))]
     if len(patient.mesh_mm.faces) > MOST_FACES:
         found.append(_too_fine(patient))
     elif not patient.is_cloud:
-        found += [_inverted(patient), _components(patient), _opening(patient)]
-    return tuple(sorted((finding for finding in found if finding), key=lambda finding: finding.kind))
+        found += [_inverted(patient), *map(_unmended, (_components(patient), _opening(patient)))]
+    return [fault for fault in found if fault]
 
 
-def repaired(
-    patient: PatientShape, frame: Frame
-) -> tuple[PatientShape, tuple[Finding, ...], tuple[Finding, ...]]:
-    """Repair the errors that the program can repair.
-
-    Returns:
-        The patient; what was found and repaired; what is still the matter.
-    """
-    done: list[Finding] = []
-    left = check_patient(patient, frame)
-    while fixable := [f for f in left if f.kind == "error" and f.repair and f.topic not in _topics(done)]:
-        assert fixable[0].repair is not None
-        patient = fixable[0].repair(patient)
-        done.append(fixable[0])
-        left = check_patient(patient, frame)
-    return patient, tuple(done), left
+def _unmended(remark: Remark | None) -> _Fault | None:
+    return None if remark is None else _Fault(remark)
 
 
-def _topics(findings: list[Finding]) -> set[str]:
-    return {finding.topic for finding in findings}
-
-
-def _unusable(patient: PatientShape) -> Finding | None:
+def _unusable(patient: PatientShape) -> Remark | None:
     points = np.asarray(patient.mesh_mm.vertices)
     if len(points) < FEWEST_POINTS:
         sentence = f"the shape has only {len(points)} points" if len(points) else "the shape is empty"
-        return Finding("error", "empty", sentence, "export the surface again")
+        return Remark("refuse", "empty", sentence, "export the surface again")
     if not np.isfinite(points).all():
-        return Finding("error", "numbers", "some coordinates are not finite numbers", "export it again")
+        return Remark("refuse", "numbers", "some coordinates are not finite numbers", "export it again")
     if _is_flat(patient):
-        return Finding("error", "flat", "the shape is flat and bounds no body", "check how it was exported")
+        return Remark("refuse", "flat", "the shape is flat and bounds no body", "check how it was exported")
     return None
 
 
@@ -294,67 +288,83 @@ def _is_flat(patient: PatientShape) -> bool:
     return volume < meshes.FLAT_SHARE * area**1.5 / (6 * np.sqrt(np.pi))
 
 
-def _units(patient: PatientShape, frame: Frame) -> Finding | None:
+def _units(patient: PatientShape, frame: Frame) -> _Fault | None:
     largest_mm = 2 * frame.scale_mm / BOX_MARGIN
     longest = float(np.ptp(patient.mesh_mm.vertices, axis=0).max())
     low, high = PLAUSIBLE_SIZE
     if low <= longest / largest_mm <= high:
         return None
     sentence = f"the shape is {longest:.3g} mm long, the atlas's shapes are up to {largest_mm:.0f} mm"
-    for unit, factor in () if patient.units_known else UNITS_MM.items():
-        if low <= longest * factor / largest_mm <= high:
-            guess = f"{sentence}, so its numbers look like {unit}"
-            return Finding("error", "units", guess, f"scale it by {factor:g}", partial(scaled, factor=factor))
+    units = {} if patient.units_known else UNITS_MM
+    fitting = {unit: mm for unit, mm in units.items() if low <= longest * mm / largest_mm <= high}
+    if fitting:
+        return _guessed(fitting, sentence)
     # Of known units, a short shape may be a small part; nothing makes a long one right.
     part = patient.units_known and longest < low * largest_mm
-    remedy = "scale it to millimetres, or check that it is this anatomy"
-    return Finding("warning" if part else "error", "units", sentence, remedy)
+    remedy = "scale it to millimetres (--scale), or check that it is this anatomy"
+    return _Fault(Remark("look" if part else "refuse", "units", sentence, remedy))
 
 
-def _voxel_indices(patient: PatientShape) -> Finding | None:
+def _guessed(fitting: Mapping[str, float], sentence: str) -> _Fault:
+    """One unit that explains the size is taken; among several a person has to choose."""
+    named = " or ".join(fitting)
+    guess = f"{sentence}, so its numbers look like {named}"
+    if len(fitting) > 1:
+        choices = " or ".join(f"--scale {mm:g} for {unit}" for unit, mm in fitting.items())
+        return _Fault(Remark("refuse", "units", guess, f"say which they are: {choices}"))
+    mm = next(iter(fitting.values()))
+    scale = partial(scaled, factor=mm)
+    return _Fault(
+        Remark("refuse", "units", guess, f"scale it by {mm:g}"), scale, f"{guess}: it was scaled by {mm:g}"
+    )
+
+
+def _voxel_indices(patient: PatientShape) -> Remark | None:
     doubled = 2 * np.asarray(patient.mesh_mm.vertices)
     if np.abs(doubled - np.round(doubled)).max() > 1e-6:
         return None
     sentence = "all coordinates are whole or half numbers, so they look like voxel indices"
-    return Finding("warning", "voxels", sentence, "scale it by the voxel size in mm if they are")
+    return Remark("look", "voxels", sentence, "if they are, give the voxel size in mm (--scale)")
 
 
-def _position(patient: PatientShape, frame: Frame) -> Finding | None:
+def _position(patient: PatientShape, frame: Frame) -> Remark | None:
     points = frame.to_model(patient.mesh_mm.vertices)
     centre = (points.min(axis=0) + points.max(axis=0)) / 2
     remedy = "align it to the atlas (icp or landmarks)"
     if np.abs(centre).max() > 1:
         away_mm = float(np.linalg.norm(centre)) * frame.scale_mm
         sentence = f"the shape lies {away_mm:.0f} mm from the middle of the atlas, outside its box"
-        return Finding("error", "far", sentence, remedy)
+        return Remark("refuse", "far", sentence, remedy)
     outside = float((np.abs(points).max(axis=1) > 1).mean())
     if not outside:
         return None
-    return Finding(
-        "warning", "outside", f"{100 * outside:.0f} % of the shape lies outside the atlas's box", remedy
+    return Remark(
+        "look", "outside", f"{100 * outside:.0f} % of the shape lies outside the atlas's box", remedy
     )
 
 
-def _space(patient: PatientShape) -> Finding | None:
+def _space(patient: PatientShape) -> Remark | None:
     if patient.space != "RAS":
         return None
     sentence = "the file says that its coordinates are RAS, while label volumes are read as LPS"
-    remedy = "turn it by half about z if the atlas was made from LPS"
-    return Finding("warning", "space", sentence, remedy, ras_to_lps)
+    return Remark("look", "space", sentence, "if it lies turned by half about z, align it (icp or landmarks)")
 
 
-def _too_fine(patient: PatientShape) -> Finding:
+def _too_fine(patient: PatientShape) -> _Fault:
     sentence = f"the surface has {len(patient.mesh_mm.faces):,} faces, more than a fit can use"
-    return Finding("error", "fine", sentence, f"decimate it to about {MOST_FACES // 2:,}", decimated)
+    few = f"{MOST_FACES // 2:,}"
+    remark = Remark("refuse", "fine", sentence, f"thin it to about {few}")
+    return _Fault(remark, decimated, f"{sentence}: it was thinned to about {few}")
 
 
-def _inverted(patient: PatientShape) -> Finding | None:
+def _inverted(patient: PatientShape) -> _Fault | None:
     turned = _outward(patient.mesh_mm)
     share = float((np.asarray(turned.faces) != patient.mesh_mm.faces).any(axis=1).mean())
     if not share:
         return None
-    sentence = f"{100 * share:.0f} % of the faces look inward, so the volume is wrong or negative"
-    return Finding("error", "inverted", sentence, "turn them round", flipped)
+    looked = f"{100 * share:.0f} % of the faces look inward, so the volume is wrong or negative"
+    remark = Remark("refuse", "inverted", looked, "turn them round")
+    return _Fault(remark, flipped, f"{100 * share:.0f} % of the faces looked inward: they were turned round")
 
 
 def _outward(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
@@ -371,14 +381,13 @@ def _volume_from_middle(mesh: trimesh.Trimesh) -> float:
     return float(np.einsum("ij,ij", heights, mesh.triangles_cross)) / 6
 
 
-def _components(patient: PatientShape) -> Finding | None:
+def _components(patient: PatientShape) -> Remark | None:
     areas = _component_areas(patient.mesh_mm)[1]
     if len(areas) < 2:
         return None
     largest = areas.max() / areas.sum()
     sentence = f"the surface has {len(areas)} components; the largest has {100 * largest:.1f} % of the area"
-    remedy = "keep the largest, or go on if they all belong to the shape"
-    return Finding("warning", "components", sentence, remedy, largest_component)
+    return Remark("look", "components", sentence, "remove those that do not belong to the shape")
 
 
 def _component_areas(mesh: trimesh.Trimesh) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
@@ -386,40 +395,15 @@ def _component_areas(mesh: trimesh.Trimesh) -> tuple[NDArray[np.int64], NDArray[
     return component, np.bincount(component, weights=mesh.area_faces).astype(np.float64)
 
 
-def _opening(patient: PatientShape) -> Finding | None:
-    holes = hole_areas_mm2(patient.mesh_mm)
+def _opening(patient: PatientShape) -> Remark | None:
+    holes = meshes.hole_areas_mm2(patient.mesh_mm)
     if not len(holes):
         return None
     share = holes.sum() / (holes.sum() + patient.mesh_mm.area)
     count = "a hole" if len(holes) == 1 else f"{len(holes)} holes"
     sentence = f"the surface is open: {count} of {100 * share:.1f} % of its area"
     remedy = "close it if the shape is whole; else it is fitted as a part, and the volume is the model's"
-    return Finding("warning", "open", sentence, remedy)
-
-
-def hole_areas_mm2(mesh_mm: trimesh.Trimesh) -> NDArray[np.float64]:
-    """Area of each hole of a surface whose faces are wound alike, ``[holes]``.
-
-    The area vector of a rim is the sum of p x q / 2 over its directed edges.
-    """
-    edges, points = rim(mesh_mm), np.asarray(mesh_mm.vertices)
-    if not len(edges):
-        return np.zeros(0)
-    graph = coo_array((np.ones(len(edges)), edges.T), (len(points), len(points)))
-    hole = connected_components(graph)[1][edges[:, 0]]
-    points = points - points[edges].mean(axis=(0, 1))
-    vectors = np.cross(points[edges[:, 0]], points[edges[:, 1]]) / 2
-    areas = np.linalg.norm([np.bincount(hole, weights=column) for column in vectors.T], axis=0)
-    return areas[np.unique(hole)]
-
-
-def rim(mesh: trimesh.Trimesh) -> NDArray[np.int64]:
-    """The edge of an open surface: directed edges that no neighbour runs along the other way, ``[n, 2]``."""
-    edges = np.asarray(mesh.faces, np.int64)[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    keys = edges.min(axis=1) * len(mesh.vertices) + edges.max(axis=1)
-    _, index = np.unique(keys, return_inverse=True)
-    surplus = np.bincount(index, weights=np.where(edges[:, 0] < edges[:, 1], 1, -1))
-    return edges[surplus[index] != 0]
+    return Remark("look", "open", sentence, remedy)
 
 
 # --- repairing ----------------------------------------------------------------------------------

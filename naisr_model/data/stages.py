@@ -59,7 +59,7 @@ def load(path: Path) -> tuple[trimesh.Trimesh, tuple[str, ...]]:
         InputError: when it cannot be used.
     """
     mesh = meshes.repair_mesh(meshes.read_mesh(path))
-    return mesh, meshes.check_mesh(mesh)
+    return mesh, tuple(remark.text for remark in meshes.check_mesh(mesh))
 
 
 def inspect(job: tuple[TableRow, str]) -> Look:

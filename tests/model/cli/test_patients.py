@@ -40,7 +40,7 @@ def plain(told, tmp_path_factory) -> dict:
 def test_a_sound_file_is_fitted_as_it_lies(plain):
     patient = plain["patient"]
     assert patient["source"] == "egg.stl, 1,280 faces"
-    assert patient["repairs"] == [] and patient["alignment"] is None
+    assert patient["remarks"] == [] and patient["alignment"] is None
     assert np.array_equal(patient["file_to_atlas"], np.eye(4))
     assert plain["volume_cm3"] == pytest.approx(TRUE_CM3, rel=0.05)
 
@@ -48,18 +48,19 @@ def test_a_sound_file_is_fitted_as_it_lies(plain):
 def test_metres_are_repaired_and_said_so(told, plain, tmp_path, capsys):
     record = told(saved(egg(6.0, 1.0), tmp_path / "m.stl", np.diag([1e-3, 1e-3, 1e-3, 1])))
     assert record["volume_cm3"] == pytest.approx(plain["volume_cm3"], rel=0.01)
-    (repair,) = record["patient"]["repairs"]
-    assert "look like metres" in repair and "scale it by 1000" in repair
+    (remark,) = record["patient"]["remarks"]
+    assert (remark["severity"], remark["topic"]) == ("fine", "units")
+    assert "look like metres" in remark["sentence"] and "was scaled by 1000" in remark["sentence"]
     assert np.allclose(record["patient"]["file_to_atlas"], np.diag([1000, 1000, 1000, 1]))
     said = capsys.readouterr().err
-    assert "naisr: read m.stl" in said and repair in said
+    assert "naisr: read m.stl" in said and f"naisr: fine: {remark['sentence']}" in said
 
 
 def test_a_stated_unit_is_not_guessed(told, plain, tmp_path, egg_atlas, capsys):
     path = saved(egg(6.0, 1.0), tmp_path / "odd.stl", np.diag([0.5, 0.5, 0.5, 1]))
     record = told(path, "--scale", "2")
     assert record["volume_cm3"] == pytest.approx(plain["volume_cm3"], rel=0.01)
-    assert record["patient"]["repairs"] == []
+    assert record["patient"]["remarks"] == []
     assert cli.main(["fit", str(path), "--atlas", str(egg_atlas), "--scale", "2000"]) == 2
     assert "scale it to millimetres" in capsys.readouterr().err
 
@@ -68,7 +69,7 @@ def test_a_small_part_in_a_stated_unit_is_no_mistake(told, tmp_path):
     points = egg(6.0, 1.0).sample(20_000, seed=0)
     np.savetxt(tmp_path / "tip.xyz", points[points[:, 2] > 31.5])
     remarks = told(tmp_path / "tip.xyz", "--scale", "1")["patient"]["remarks"]
-    assert any("check that it is this anatomy" in remark for remark in remarks)
+    assert any("check that it is this anatomy" in remark["remedy"] for remark in remarks)
 
 
 def test_icp_brings_a_moved_scan_home(told, plain, tmp_path, capsys):
@@ -105,7 +106,7 @@ def test_points_and_a_part_will_do(told, plain, tmp_path):
         for words in ([], ["--align", "icp"]):
             record = told(path, *words)
             assert record["volume_cm3"] == pytest.approx(plain["volume_cm3"], rel=0.08)
-    assert any("the surface is open" in remark for remark in record["patient"]["remarks"])
+    assert any("the surface is open" in remark["sentence"] for remark in record["patient"]["remarks"])
 
 
 def test_transfer_and_evolve_take_the_same_way_in(egg_atlas, tmp_path, capsys):

@@ -152,14 +152,14 @@ def test_an_inside_out_neighbour_is_turned_but_a_cavity_is_kept():
     neighbour.invert()
     mesh = repair_mesh(outer + cavity + neighbour)
     assert mesh.volume == pytest.approx(expected)
-    assert check_mesh(mesh) == ("3 components",)
+    assert [remark.text for remark in check_mesh(mesh)] == ["3 components"]
 
 
 def test_small_holes_are_bearable_and_said(ellipsoid):
     keep = np.random.default_rng(0).random(len(ellipsoid.faces)) > 0.01
     ellipsoid.update_faces(keep)
     (oddity,) = check_mesh(repair_mesh(ellipsoid))
-    assert "open edges" in oddity
+    assert "open edges" in oddity.text
 
 
 def test_what_bounds_no_body_is_rejected(ellipsoid):
