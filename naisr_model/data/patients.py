@@ -12,12 +12,11 @@ from functools import partial
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-import igl
 import numpy as np
 import trimesh
 from numpy.typing import ArrayLike, NDArray
 
-from naisr_model.data import meshes, volumes
+from naisr_model.data import formats, meshes, volumes
 from naisr_model.data.remarks import Remark, gravest_first
 from naisr_model.errors import InputError
 from naisr_model.frames import BOX_MARGIN, Frame
@@ -30,7 +29,7 @@ MOST_FACES = 500_000
 
 FEWEST_POINTS = 50
 
-UNITS_MM = {"metres": 1000.0, "centimetres": 10.0, "inches": 25.4, "micrometres": 0.001}
+UNITS_MM = {"millimetres": 1.0, "metres": 1000.0, "centimetres": 10.0, "inches": 25.4, "micrometres": 0.001}
 PLAUSIBLE_SIZE = (0.15, 1.3)
 """Longest side of a shape over that of the population's largest: from a newborn, or a piece, up."""
 
@@ -51,6 +50,7 @@ class PatientShape:
         remarks: what was odd about the file, and what was repaired.
         from_file: 4x4, coordinates as they were read to those of ``mesh_mm``, by every repair and
             motion since; landmarks of the file go the same way.
+        unit_mm: how long a unit of the file is.
         units_known: whether a person said how long a unit is, so that it is not guessed.
     """
 
@@ -59,6 +59,7 @@ class PatientShape:
     space: Literal["LPS", "RAS", ""] = ""
     remarks: tuple[Remark, ...] = ()
     from_file: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
+    unit_mm: float = 1.0
     units_known: bool = False
 
     @property
@@ -69,7 +70,7 @@ class PatientShape:
     @property
     def is_closed(self) -> bool:
         """Whether the surface bounds a body, so that its volume means something."""
-        return not self.is_cloud and not len(meshes.rim(self.mesh_mm))
+        return meshes.is_closed(self.mesh_mm)
 
     @property
     def volume_cm3(self) -> float | None:
@@ -91,34 +92,32 @@ def read_patient(path: str | Path, label: int | str | None = None) -> PatientSha
     Raises:
         InputError: when the file cannot be used, or a volume has several labels and none is chosen.
     """
-    path = Path(path)
+    path = formats.check_path(path)
     if path.name.lower().endswith(volumes.ENDINGS):
         return _from_labels(path, volumes.read_labels(path), label)
     if label is not None:
         raise InputError(f"{path.name} is no label volume, so label {label} cannot be chosen; leave it out")
-    if path.suffix.lower() in POINT_ENDINGS:
+    if path.suffix.lower() in POINT_ENDINGS and not _holds_mesh(path):
         points = read_points(path)
         return PatientShape(_cloud(points), f"{path.name}, {len(points):,} points")
     return _from_mesh(path)
 
 
+def _holds_mesh(path: Path) -> bool:
+    """Whether a file that is called a text of points is a mesh all the same."""
+    return bool(formats.format_of(formats.plain(formats.content_of(path)), path.suffix.lower()[1:]))
+
+
 def _from_mesh(path: Path) -> PatientShape:
-    if path.suffix.lower() not in meshes.READERS:
-        known = sorted(meshes.READERS | POINT_ENDINGS | set(volumes.ENDINGS))
-        raise InputError(f"{path.name} is not one of {', '.join(known)}; convert it first")
-    mesh = meshes.read_mesh_or_points(path)
+    file = meshes.read_file(path, {*POINT_ENDINGS, *volumes.ENDINGS})
+    mesh, remarks = file.mesh_mm, file.remarks
     kind = f"{len(mesh.faces):,} faces" if len(mesh.faces) else f"{len(mesh.vertices):,} points"
-    # Beyond that, cleaning takes a minute, and decimation cleans as well.
+    # Beyond that, mending takes a minute, and decimation cleans as well.
     if 0 < len(mesh.faces) <= MOST_FACES:
-        mesh = meshes.cleaned(mesh)
-    return PatientShape(mesh, f"{path.name}, {kind}", _stated_space(path))
-
-
-def _stated_space(path: Path) -> Literal["LPS", "RAS", ""]:
-    """What 3D Slicer writes at the start of a mesh file."""
-    with path.open("rb") as file:
-        start = file.read(1024)
-    return "RAS" if b"SPACE=RAS" in start else "LPS" if b"SPACE=LPS" in start else ""
+        mesh, mended = meshes.mended_mesh(mesh)
+        remarks = (*remarks, *mended)
+    unit_mm = float(np.linalg.norm(file.from_file[:3, 0]))
+    return PatientShape(mesh, f"{path.name}, {kind}", file.space, remarks, file.from_file, unit_mm)
 
 
 def _cloud(points: NDArray[np.float64]) -> trimesh.Trimesh:
@@ -170,10 +169,13 @@ def read_points(path: str | Path) -> NDArray[np.float64]:
         InputError: when the file is missing, is no such text or has a coordinate that is not finite.
     """
     path = Path(path)
+    content = formats.plain(formats.content_of(path))
+    if what := formats.foreign(content):
+        raise InputError(f"{path.name} is {what[0]}; {what[1]}")
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path.name} cannot be read ({error}); give a text file of points") from error
+        text = content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path.name} is no text ({error}); give a text file of points") from error
     lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
     if not lines:
         raise InputError(f"{path.name} is empty; give a line x,y,z for each point")
@@ -254,10 +256,14 @@ def _faults(patient: PatientShape, frame: Frame) -> list[_Fault]:
     units = _units(patient, frame)
     position = None if units and units.remark.severity == "refuse" else _position(patient, frame)
     found = [units, *map(_unmended, (position, _voxel_indices(patient), _space(patient)))]
+    found.append(_unmended(meshes.debris(patient.mesh_mm)))
     if len(patient.mesh_mm.faces) > MOST_FACES:
         found.append(_too_fine(patient))
     elif not patient.is_cloud:
-        found += [_inverted(patient), *map(_unmended, (_components(patient), _opening(patient)))]
+        found += [
+            _inverted(patient),
+            *map(_unmended, (meshes.components(patient.mesh_mm), _opening(patient))),
+        ]
     return [fault for fault in found if fault]
 
 
@@ -288,34 +294,42 @@ def _is_flat(patient: PatientShape) -> bool:
     return volume < meshes.FLAT_SHARE * area**1.5 / (6 * np.sqrt(np.pi))
 
 
+def _main_points(patient: PatientShape) -> NDArray[np.float64]:
+    """The points without those of debris."""
+    return np.asarray(patient.mesh_mm.vertices, np.float64)[~meshes.far_points(patient.mesh_mm)]
+
+
 def _units(patient: PatientShape, frame: Frame) -> _Fault | None:
     largest_mm = 2 * frame.scale_mm / BOX_MARGIN
-    longest = float(np.ptp(patient.mesh_mm.vertices, axis=0).max())
+    longest = float(np.ptp(_main_points(patient), axis=0).max())
     low, high = PLAUSIBLE_SIZE
     if low <= longest / largest_mm <= high:
         return None
     sentence = f"the shape is {longest:.3g} mm long, the atlas's shapes are up to {largest_mm:.0f} mm"
     units = {} if patient.units_known else UNITS_MM
-    fitting = {unit: mm for unit, mm in units.items() if low <= longest * mm / largest_mm <= high}
-    if fitting:
-        return _guessed(fitting, sentence)
+    fits = {
+        unit: mm for unit, mm in units.items() if low <= longest * mm / patient.unit_mm / largest_mm <= high
+    }
+    if fits:
+        return _guessed(fits, sentence, patient.unit_mm)
     # Of known units, a short shape may be a small part; nothing makes a long one right.
     part = patient.units_known and longest < low * largest_mm
     remedy = "scale it to millimetres (--scale), or check that it is this anatomy"
     return _Fault(Remark("look" if part else "refuse", "units", sentence, remedy))
 
 
-def _guessed(fitting: Mapping[str, float], sentence: str) -> _Fault:
+def _guessed(fits: Mapping[str, float], sentence: str, unit_mm: float) -> _Fault:
     """One unit that explains the size is taken; among several a person has to choose."""
-    named = " or ".join(fitting)
-    guess = f"{sentence}, so its numbers look like {named}"
-    if len(fitting) > 1:
-        choices = " or ".join(f"--scale {mm:g} for {unit}" for unit, mm in fitting.items())
+    guess = f"{sentence}, so its numbers look like {' or '.join(fits)}"
+    if len(fits) > 1:
+        choices = " or ".join(f"--scale {mm:g} for {unit}" for unit, mm in fits.items())
         return _Fault(Remark("refuse", "units", guess, f"say which they are: {choices}"))
-    mm = next(iter(fitting.values()))
-    scale = partial(scaled, factor=mm)
+    (mm,) = fits.values()
+    done = f"{guess}: it was scaled by {mm / unit_mm:g}"
     return _Fault(
-        Remark("refuse", "units", guess, f"scale it by {mm:g}"), scale, f"{guess}: it was scaled by {mm:g}"
+        Remark("refuse", "units", guess, f"scale it by {mm / unit_mm:g}"),
+        partial(scaled, factor=mm / unit_mm),
+        done,
     )
 
 
@@ -328,7 +342,7 @@ def _voxel_indices(patient: PatientShape) -> Remark | None:
 
 
 def _position(patient: PatientShape, frame: Frame) -> Remark | None:
-    points = frame.to_model(patient.mesh_mm.vertices)
+    points = frame.to_model(_main_points(patient))
     centre = (points.min(axis=0) + points.max(axis=0)) / 2
     remedy = "align it to the atlas (icp or landmarks)"
     if np.abs(centre).max() > 1:
@@ -381,29 +395,12 @@ def _volume_from_middle(mesh: trimesh.Trimesh) -> float:
     return float(np.einsum("ij,ij", heights, mesh.triangles_cross)) / 6
 
 
-def _components(patient: PatientShape) -> Remark | None:
-    areas = _component_areas(patient.mesh_mm)[1]
-    if len(areas) < 2:
-        return None
-    largest = areas.max() / areas.sum()
-    sentence = f"the surface has {len(areas)} components; the largest has {100 * largest:.1f} % of the area"
-    return Remark("look", "components", sentence, "remove those that do not belong to the shape")
-
-
-def _component_areas(mesh: trimesh.Trimesh) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    component = np.asarray(igl.facet_components(np.asarray(mesh.faces, np.int64))[1])
-    return component, np.bincount(component, weights=mesh.area_faces).astype(np.float64)
-
-
 def _opening(patient: PatientShape) -> Remark | None:
-    holes = meshes.hole_areas_mm2(patient.mesh_mm)
-    if not len(holes):
-        return None
-    share = holes.sum() / (holes.sum() + patient.mesh_mm.area)
-    count = "a hole" if len(holes) == 1 else f"{len(holes)} holes"
-    sentence = f"the surface is open: {count} of {100 * share:.1f} % of its area"
+    remark = meshes.opening(patient.mesh_mm)
+    if remark is None or remark.severity == "fine":
+        return remark
     remedy = "close it if the shape is whole; else it is fitted as a part, and the volume is the model's"
-    return Remark("look", "open", sentence, remedy)
+    return replace(remark, remedy=remedy)
 
 
 # --- repairing ----------------------------------------------------------------------------------
@@ -433,7 +430,7 @@ def flipped(patient: PatientShape) -> PatientShape:
 
 def largest_component(patient: PatientShape) -> PatientShape:
     """The component with the largest area alone; cavities, which are components too, are filled."""
-    component, areas = _component_areas(patient.mesh_mm)
+    component, areas = meshes.component_areas(patient.mesh_mm)
     mesh = patient.mesh_mm.copy()
     mesh.update_faces(component == areas.argmax())
     mesh.remove_unreferenced_vertices()
@@ -463,13 +460,16 @@ def decimated(patient: PatientShape, faces: int = MOST_FACES // 2) -> PatientSha
 
 
 def _without_folds(faces: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Leave out each pair of faces that share their corners and look opposite ways."""
+    """Leave out each pair of faces that share their corners and look opposite ways.
+
+    What looks one way twice stays twice, or the surface would be open there.
+    """
     order = np.argsort(faces, axis=1)
     turns = np.where(np.linalg.det(np.eye(3)[order]) > 0, 1, -1)
     corners, index = np.unique(np.take_along_axis(faces, order, axis=1), axis=0, return_inverse=True)
-    net = np.bincount(index.ravel(), weights=turns).round()
-    kept = corners[net != 0]
-    return np.where((net[net != 0] > 0)[:, None], kept, kept[:, ::-1])
+    net = np.bincount(index.ravel(), weights=turns).round().astype(np.int64)
+    facing = np.where((net > 0)[:, None], corners, corners[:, ::-1])
+    return np.repeat(facing, np.abs(net), axis=0)
 
 
 def _area_mm2(mesh: trimesh.Trimesh) -> float:

@@ -199,7 +199,7 @@ def _in_units(patient: PatientShape, scale: float | None) -> PatientShape:
         return patient
     if not 0 < scale < math.inf:
         raise InputError(f"the scale is {scale:g}; give the millimetres per unit of the file, as 1000")
-    return replace(scaled(patient, scale), units_known=True)
+    return replace(scaled(patient, scale / patient.unit_mm), units_known=True)
 
 
 def _refuse(name: str, remarks: Iterable[Remark]) -> None:
