@@ -211,8 +211,11 @@ def cleaned(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     mesh = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
     faces = np.asarray(mesh.faces, np.int64)
-    faces = _without_doubles(faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)])
-    mesh = trimesh.Trimesh(mesh.vertices, faces, process=False)
+    faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
+    once = _without_doubles(faces)
+    # Where surfaces touch, the same face twice may be what closes them.
+    opens = len(once) < len(faces) and not _odd_edges(faces) and _odd_edges(once)
+    mesh = trimesh.Trimesh(mesh.vertices, faces if opens else once, process=False)
     mesh.remove_unreferenced_vertices()
     if not len(mesh.faces) or mesh.is_winding_consistent:
         return mesh
@@ -260,6 +263,11 @@ def _edges(faces: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int6
     keys = ends[:, 0] * (int(faces.max(initial=0)) + 1) + ends[:, 1]
     _, index, count = np.unique(keys, return_inverse=True, return_counts=True)
     return index, count
+
+
+def _odd_edges(faces: NDArray[np.int64]) -> int:
+    """How many edges have an odd number of faces, as none of a closed surface has."""
+    return int((_edges(faces)[1] % 2).sum())
 
 
 def _without_inner_walls(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
@@ -409,7 +417,9 @@ def check_mesh(mesh: trimesh.Trimesh) -> tuple[Remark, ...]:
         )
     if bulk.volume[0] < FLAT_SHARE * bulk.area[0] ** 1.5 / (6 * np.sqrt(np.pi)):
         raise InputError("the surface encloses no volume; it must bound a body")
-    return tuple(remark for remark in (opening(mesh), components(mesh), debris(mesh)) if remark)
+    return tuple(
+        remark for remark in (opening(mesh), components(mesh), debris(mesh, far_points(mesh))) if remark
+    )
 
 
 def opening(mesh: trimesh.Trimesh) -> Remark | None:
@@ -444,13 +454,12 @@ def component_areas(mesh: trimesh.Trimesh) -> tuple[NDArray[np.int64], NDArray[n
     return component, np.bincount(component, weights=mesh.area_faces).astype(np.float64)
 
 
-def debris(mesh: trimesh.Trimesh) -> Remark | None:
-    """What is to be said of pieces far away from the main one, or of outliers of a cloud."""
-    far = far_points(mesh)
+def debris(mesh: trimesh.Trimesh, far: NDArray[np.bool_]) -> Remark | None:
+    """What is to be said of the points that :func:`far_points` found."""
     if not far.any():
         return None
     points = np.asarray(mesh.vertices)
-    away_mm = cKDTree(points[~far]).query(points[far])[0]
+    away_mm = cKDTree(points[~far]).query(points[far][:: max(1, int(far.sum()) // _FEW_POINTS)])[0]
     share = 100 * _area_share(mesh, far)
     sentence = f"{share:.2g} % of it lies {away_mm.min():.0f} to {away_mm.max():.0f} mm from the main piece"
     return Remark("look", "debris", sentence, "remove them if they do not belong to the shape")
@@ -476,15 +485,20 @@ def far_points(mesh: trimesh.Trimesh) -> NDArray[np.bool_]:
         return far
     of_point = np.zeros(len(points), np.int64)
     of_point[np.asarray(mesh.faces).ravel()] = np.repeat(component, 3)
-    main = of_point == areas.argmax()
-    limit = FAR * float(np.ptp(points[main], axis=0).max())
-    away = cKDTree(points[main]).query(points[~main], distance_upper_bound=limit)[0]
+    main = points[of_point == areas.argmax()]
+    limit = FAR * float(np.ptp(main, axis=0).max())
+    some = np.flatnonzero(of_point != areas.argmax())
+    some = some[:: max(1, len(some) // _FEW_POINTS)]
+    # Every component has a say, however few points it has.
+    some = np.union1d(some, np.unique(of_point, return_index=True)[1])
+    away = cKDTree(main[:: max(1, len(main) // _FEW_POINTS)]).query(points[some])[0]
     nearest = np.full(len(areas), np.inf)
-    np.minimum.at(nearest, of_point[~main], away)
+    np.minimum.at(nearest, of_point[some], away)
     nearest[areas.argmax()] = 0
-    return ~np.isfinite(nearest)[of_point]
+    return np.asarray(nearest > limit)[of_point]
 
 
+_FEW_POINTS = 20_000
 _OUTLYING = 5.0
 
 
@@ -517,8 +531,8 @@ def hole_areas_mm2(mesh_mm: trimesh.Trimesh) -> NDArray[np.float64]:
 
 def rim(mesh: trimesh.Trimesh) -> NDArray[np.int64]:
     """The edge of an open surface: directed edges that no neighbour runs along the other way, ``[n, 2]``."""
-    edges = np.asarray(mesh.faces, np.int64)[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    keys = edges.min(axis=1) * len(mesh.vertices) + edges.max(axis=1)
-    _, index = np.unique(keys, return_inverse=True)
+    faces = np.asarray(mesh.faces, np.int64)
+    index, _ = _edges(faces)
+    edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     surplus = np.bincount(index, weights=np.where(edges[:, 0] < edges[:, 1], 1, -1))
     return edges[surplus[index] != 0]

@@ -253,10 +253,12 @@ def _mendable(patient: PatientShape, frame: Frame, done: Container[str]) -> Iter
 def _faults(patient: PatientShape, frame: Frame) -> list[_Fault]:
     if fatal := _unusable(patient):
         return [_Fault(fatal)]
-    units = _units(patient, frame)
-    position = None if units and units.remark.severity == "refuse" else _position(patient, frame)
+    far = meshes.far_points(patient.mesh_mm)
+    main_mm = np.asarray(patient.mesh_mm.vertices, np.float64)[~far]
+    units = _units(patient, main_mm, frame)
+    position = None if units and units.remark.severity == "refuse" else _position(main_mm, frame)
     found = [units, *map(_unmended, (position, _voxel_indices(patient), _space(patient)))]
-    found.append(_unmended(meshes.debris(patient.mesh_mm)))
+    found.append(_unmended(meshes.debris(patient.mesh_mm, far)))
     if len(patient.mesh_mm.faces) > MOST_FACES:
         found.append(_too_fine(patient))
     elif not patient.is_cloud:
@@ -294,14 +296,10 @@ def _is_flat(patient: PatientShape) -> bool:
     return volume < meshes.FLAT_SHARE * area**1.5 / (6 * np.sqrt(np.pi))
 
 
-def _main_points(patient: PatientShape) -> NDArray[np.float64]:
-    """The points without those of debris."""
-    return np.asarray(patient.mesh_mm.vertices, np.float64)[~meshes.far_points(patient.mesh_mm)]
-
-
-def _units(patient: PatientShape, frame: Frame) -> _Fault | None:
+def _units(patient: PatientShape, main_mm: NDArray[np.float64], frame: Frame) -> _Fault | None:
+    """Judged by the points of the main piece."""
     largest_mm = 2 * frame.scale_mm / BOX_MARGIN
-    longest = float(np.ptp(_main_points(patient), axis=0).max())
+    longest = float(np.ptp(main_mm, axis=0).max())
     low, high = PLAUSIBLE_SIZE
     if low <= longest / largest_mm <= high:
         return None
@@ -341,8 +339,8 @@ def _voxel_indices(patient: PatientShape) -> Remark | None:
     return Remark("look", "voxels", sentence, "if they are, give the voxel size in mm (--scale)")
 
 
-def _position(patient: PatientShape, frame: Frame) -> Remark | None:
-    points = frame.to_model(_main_points(patient))
+def _position(main_mm: NDArray[np.float64], frame: Frame) -> Remark | None:
+    points = frame.to_model(main_mm)
     centre = (points.min(axis=0) + points.max(axis=0)) / 2
     remedy = "align it to the atlas (icp or landmarks)"
     if np.abs(centre).max() > 1:
@@ -368,7 +366,7 @@ def _too_fine(patient: PatientShape) -> _Fault:
     sentence = f"the surface has {len(patient.mesh_mm.faces):,} faces, more than a fit can use"
     few = f"{MOST_FACES // 2:,}"
     remark = Remark("refuse", "fine", sentence, f"thin it to about {few}")
-    return _Fault(remark, decimated, f"{sentence}: it was thinned to about {few}")
+    return _Fault(remark, _thinned, f"{sentence}: it was thinned to about {few}")
 
 
 def _inverted(patient: PatientShape) -> _Fault | None:
@@ -456,7 +454,15 @@ def decimated(patient: PatientShape, faces: int = MOST_FACES // 2) -> PatientSha
     coarse = pyvista.wrap(binning.GetOutput())
     vertices, triangles = np.asarray(coarse.points, np.float64), np.asarray(coarse.regular_faces, np.int64)
     unfolded = trimesh.Trimesh(vertices, _without_folds(triangles), process=False)
-    return replace(patient, mesh_mm=meshes.cleaned(unfolded))
+    unfolded.remove_unreferenced_vertices()
+    return replace(patient, mesh_mm=unfolded)
+
+
+def _thinned(patient: PatientShape) -> PatientShape:
+    """Decimated, and mended as smaller surfaces are when they are read."""
+    thin = decimated(patient)
+    mesh, mended = meshes.mended_mesh(thin.mesh_mm)
+    return replace(thin, mesh_mm=mesh, remarks=(*thin.remarks, *mended))
 
 
 def _without_folds(faces: NDArray[np.int64]) -> NDArray[np.int64]:

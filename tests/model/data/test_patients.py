@@ -183,6 +183,36 @@ def test_units_are_guessed_and_set_right(unit, mm):
     assert check_patient(right, FRAME) == ()
 
 
+def test_two_units_that_explain_a_size_are_not_guessed_between():
+    """71 might be inches, a person, or centimetres, a small child."""
+    people = Frame((0.0, 0.0, 0.0), 1150.0)
+    patient = scaled(PatientShape(body()), 71 / 120)
+    (remark,) = check_patient(patient, people)
+    assert (remark.severity, remark.topic) == ("refuse", "units")
+    assert "look like centimetres or inches" in remark.text
+    assert "--scale 10 for centimetres or --scale 25.4 for inches" in remark.remedy
+    assert repaired(patient, people) is patient
+
+
+def test_a_glb_in_millimetres_is_told_from_one_in_metres(tmp_path):
+    (tmp_path / "scan.glb").write_bytes(mesh_bytes(body(), "glb"))
+    metres = read_patient(tmp_path / "scan.glb")
+    assert metres.unit_mm == 1000 and check_patient(metres, FRAME) == ()
+    body().export(tmp_path / "scan.glb")  # against the convention
+    patient = repaired(read_patient(tmp_path / "scan.glb"), FRAME)
+    assert patient.mesh_mm.volume == pytest.approx(body().volume, rel=1e-5)
+    assert "look like millimetres" in patient.remarks[-1].text
+
+
+def test_debris_does_not_hide_the_unit_or_the_place():
+    crumb = trimesh.creation.icosphere(2, radius=1.0)
+    crumb.apply_translation([900.0, 0.0, 0.0])
+    patient = PatientShape(body() + crumb)
+    assert sorted(topics(patient)) == ["components", "debris"]
+    points = np.vstack([body().vertices, [[900.0, 0.0, 0.0]]])
+    assert topics(PatientShape(cloud(points))) == ["debris"]
+
+
 def test_a_size_that_no_unit_explains_is_left_to_a_person():
     (remark,) = check_patient(scaled(PatientShape(body()), 7.0), FRAME)
     assert (remark.severity, remark.topic) == ("refuse", "units")
