@@ -69,7 +69,8 @@ class ExportDialog(QDialog):
         form.addRow("Detail", self.detail)
         form.addRow("Folder", where)
         note = QLabel(
-            "Millimetres. A record beside each file (.json) tells the covariates and the atlas.", self
+            "Millimetres, z up; GLB: metres, y up, as the format says. A record beside each file (.json) tells the covariates and the atlas.",
+            self,
         )
         note.setObjectName("muted")
         note.setWordWrap(True)

@@ -8,11 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import pyvista
 import trimesh
 from eggs import egg, label_volume, saved, turned
 
 from naisr_model import cli
 from naisr_model.atlas import Alternative, Atlas, Fit
+from naisr_model.exports import mesh_bytes
 
 KNOWN = ["--known", "age=6,sex=M"]
 TRUE_CM3 = egg(6.0, 1.0).volume / 1000
@@ -242,3 +244,42 @@ def test_a_model_without_covariates_is_only_fitted(egg_deepsdf, patient, words, 
     assert cli.main(["fit", *given, "--json", str(tmp_path / "fit.json")]) == 0
     assert json.loads((tmp_path / "fit.json").read_text())["lasting"] is None
     assert "volume: " in capsys.readouterr().out and (tmp_path / "out" / "shapes.png").exists()
+
+
+@pytest.mark.parametrize("ending", ["glb", "vtp"])
+def test_what_mesh_writes_fit_reads(told, egg_atlas, tmp_path, ending):
+    path = tmp_path / f"shape.{ending}"
+    assert (
+        cli.main(
+            ["mesh", str(egg_atlas), str(path), "--set", "age=6", "--set", "sex=M", "--resolution", "64"]
+        )
+        == 0
+    )
+    record = told(path)
+    own_cm3 = record["patient"]["volume_cm3"]
+    assert own_cm3 == pytest.approx(TRUE_CM3, rel=0.05)
+    assert record["volume_cm3"] == pytest.approx(own_cm3, rel=0.05)
+    remarks = record["patient"]["remarks"]
+    assert [remark["topic"] for remark in remarks] == (["convention"] if ending == "glb" else [])
+
+
+@pytest.mark.parametrize("ending", ["stl", "ply", "vtk", "vtp", "glb"])
+def test_a_file_that_was_cut_off_ends_with_one_sentence(egg_atlas, tmp_path, ending, capfd):
+    path = tmp_path / f"cut.{ending}"
+    if ending == "vtk":
+        pyvista.wrap(egg(6.0, 1.0)).save(path)
+    else:
+        path.write_bytes(mesh_bytes(egg(6.0, 1.0), ending))
+    path.write_bytes(path.read_bytes()[: path.stat().st_size * 3 // 5])
+    assert cli.main(["fit", str(path), "--atlas", str(egg_atlas)]) == 2
+    out, said = capfd.readouterr()
+    assert out == "" and said.startswith(f"naisr: {path.name} is cut off") and said.count("\n") == 1
+
+
+def test_two_units_that_fit_are_asked_for(egg_atlas, tmp_path, capsys):
+    """0.9 and 25.4 times as long as the largest egg, or 10 times, are both plausible."""
+    path = saved(egg(6.0, 1.0), tmp_path / "unit.stl", np.diag([0.04, 0.04, 0.04, 1]))
+    assert cli.main(["fit", str(path), "--atlas", str(egg_atlas)]) == 2
+    said = capsys.readouterr().err
+    assert "--scale 10 for centimetres or --scale 25.4 for inches" in said and said.count("\n") == 1
+    assert cli.main(["fit", str(path), "--atlas", str(egg_atlas), "--scale", "25.4"]) == 0
