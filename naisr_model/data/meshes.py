@@ -323,14 +323,14 @@ def _lies_inside(
 
 
 def overlap_share(mesh: trimesh.Trimesh) -> float:
-    """Share of a closed surface's area that does not part its inside from its outside; 0 for an open one.
+    """Share of a closed surface's area that does not part inside from outside; 0 of what bounds no body.
 
     Just inside such a surface the winding number is 1 and just outside 0; where pieces overlap or sheets are
     double it is more, on both sides of a wall alike. Judged at :data:`OVERLAP_SAMPLES` points.
     """
-    if not is_closed(mesh):
-        return 0.0
     mesh = faced_outward(mesh)
+    if not is_closed(mesh) or is_flat(mesh):
+        return 0.0
     vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
     points, chosen = trimesh.sample.sample_surface(mesh, OVERLAP_SAMPLES, seed=0)
     step = _STEP * float(np.ptp(vertices, axis=0).max()) * np.asarray(mesh.face_normals)[chosen]
@@ -409,17 +409,26 @@ def check_mesh(mesh: trimesh.Trimesh) -> tuple[Remark, ...]:
     """
     if not len(mesh.faces):
         raise InputError("the mesh has no faces; check how it was exported")
-    vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
-    bulk = _bulk(vertices, faces, np.zeros(len(faces), dtype=np.int64))
-    if bulk.opening[0] > OPEN_SHARE:
-        raise InputError(
-            f"the surface is open (opening {100 * bulk.opening[0]:.0f} % of its area); close its holes"
-        )
-    if bulk.volume[0] < FLAT_SHARE * bulk.area[0] ** 1.5 / (6 * np.sqrt(np.pi)):
+    opened = float(_whole(mesh).opening[0])
+    if opened > OPEN_SHARE:
+        raise InputError(f"the surface is open (opening {100 * opened:.0f} % of its area); close its holes")
+    if is_flat(mesh):
         raise InputError("the surface encloses no volume; it must bound a body")
     return tuple(
         remark for remark in (opening(mesh), components(mesh), debris(mesh, far_points(mesh))) if remark
     )
+
+
+def is_flat(mesh: trimesh.Trimesh) -> bool:
+    """Whether a surface with outward faces encloses next to nothing for its area."""
+    whole = _whole(mesh)
+    return bool(whole.volume[0] < FLAT_SHARE * whole.area[0] ** 1.5 / (6 * np.sqrt(np.pi)))
+
+
+def _whole(mesh: trimesh.Trimesh) -> _Bulk:
+    """Of all faces together."""
+    faces = np.asarray(mesh.faces, np.int64)
+    return _bulk(np.asarray(mesh.vertices, np.float64), faces, np.zeros(len(faces), dtype=np.int64))
 
 
 def opening(mesh: trimesh.Trimesh) -> Remark | None:

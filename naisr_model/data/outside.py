@@ -80,5 +80,5 @@ def _contour(values: NDArray[np.float64], origin: NDArray[np.float64], side: flo
     image.point_data["distance"] = level.ravel(order="F")
     surface = image.contour([0.0], scalars="distance", method="flying_edges")
     triangles = np.asarray(surface.regular_faces, np.int64).reshape(-1, 3)
-    mesh = trimesh.Trimesh(np.asarray(surface.points, np.float64), triangles, process=False)
-    return mesh if mesh.volume > 0 else trimesh.Trimesh(mesh.vertices, triangles[:, ::-1], process=False)
+    # Of values that are negative inside, the triangles look inward.
+    return trimesh.Trimesh(np.asarray(surface.points, np.float64), triangles[:, ::-1], process=False)

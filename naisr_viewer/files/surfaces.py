@@ -11,13 +11,13 @@ import numpy as np
 
 from naisr_model.covariates import Covariate
 from naisr_model.errors import InputError
-from naisr_model.exports import mesh_bytes
+from naisr_model.exports import FORMATS, mesh_bytes
 from naisr_model.files import replacing
 from naisr_viewer import __version__
 from naisr_viewer.panels.kinds import title_of
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.patients import OpenScan
-from naisr_viewer.state.requests import FORMATS, SurfaceResult
+from naisr_viewer.state.requests import SurfaceResult
 
 if TYPE_CHECKING:
     import trimesh
@@ -42,7 +42,7 @@ def write_surface(
     """Write a surface and, beside it, a JSON record of what it shows.
 
     Args:
-        path: the mesh file; its ending is one of :data:`FORMATS`.
+        path: the mesh file; its ending is one of :data:`~naisr_model.exports.FORMATS`.
         result: the surface, in millimetres.
         atlas: where it came from.
         patient: whose it is; None for the population average.

@@ -13,9 +13,10 @@ import trimesh
 
 from naisr_model import __version__
 from naisr_model.errors import InputError
+from naisr_model.exports import FORMATS
 from naisr_viewer.files import surfaces as export
 from naisr_viewer.state.layouts import FULL_SHAPE, Panel
-from naisr_viewer.state.requests import FORMATS, SurfaceRequest, SurfaceResult
+from naisr_viewer.state.requests import SurfaceRequest, SurfaceResult
 
 VALUES = {"age": 150.0, "weight": 50.0, "sex": 1.0}
 
