@@ -173,6 +173,9 @@ def mended_mesh(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, tuple[Remark, .
 
     Returns:
         The mesh, and what was done that a person has to know.
+
+    Raises:
+        InputError: when its faces cross each other all over, so that it has no outside.
     """
     mesh = cleaned(mesh)
     without_walls = _without_inner_walls(mesh)
@@ -187,10 +190,10 @@ def mended_mesh(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, tuple[Remark, .
         return without_walls, said
     outer, pieces = _without_inner_pieces(faced_outward(without_walls))
     if pieces and overlap_share(outer) <= OVERLAP_SHARE:
-        sentence = f"{pieces} closed pieces inside the shape were left out, since their faces look outward"
+        sentence = f"{_counted(pieces)} inside the shape counted for nothing, with faces that look outward"
         return outer, (
             *said,
-            Remark("look", "overlap", sentence, "if they are cavities, turn their faces round"),
+            Remark("look", "overlap", sentence, "if that is a cavity, turn its faces round"),
         )
     whole, side_mm = outside(faced_outward(without_walls))
     sentence = (
@@ -201,6 +204,10 @@ def mended_mesh(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, tuple[Remark, .
         *said,
         Remark("look", "overlap", sentence, "join the pieces into one surface to keep its detail"),
     )
+
+
+def _counted(pieces: int) -> str:
+    return "a closed piece" if pieces == 1 else f"{pieces} closed pieces"
 
 
 def cleaned(mesh: trimesh.Trimesh) -> trimesh.Trimesh:

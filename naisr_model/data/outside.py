@@ -12,8 +12,13 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from naisr_model.errors import InputError
+
 CELLS = 128
 """Along the longest side; the surface lies within a small part of a cell of where it should."""
+
+MOST_NEAR = 0.4
+"""Share of the lattice's nodes that may lie near a face; of sound surfaces a tenth do."""
 
 _BLOCK = 4
 
@@ -23,6 +28,9 @@ def outside(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, float]:
 
     Args:
         mesh: a closed surface or several, faces outward.
+
+    Raises:
+        InputError: when the faces fill most of space, as those of a damaged file do.
     """
     vertices = np.ascontiguousarray(mesh.vertices, np.float64)
     faces = np.ascontiguousarray(mesh.faces, np.int64)
@@ -33,6 +41,10 @@ def outside(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, float]:
     origin = low - side * _BLOCK * (1 - 1 / np.pi)
     values = _far_values(vertices, faces, origin, side, blocks)
     near = np.argwhere(np.isnan(values))
+    if len(near) > MOST_NEAR * values.size:
+        raise InputError(
+            "the faces cross each other all over the shape, so it has no outside; export it again"
+        )
     values[tuple(near.T)] = _signed_distances(vertices, faces, origin + near * side)
     return _contour(values, origin, side), side
 

@@ -114,7 +114,10 @@ def _from_mesh(path: Path) -> PatientShape:
     kind = f"{len(mesh.faces):,} faces" if len(mesh.faces) else f"{len(mesh.vertices):,} points"
     # Beyond that, mending takes a minute, and decimation cleans as well.
     if 0 < len(mesh.faces) <= MOST_FACES:
-        mesh, mended = meshes.mended_mesh(mesh)
+        try:
+            mesh, mended = meshes.mended_mesh(mesh)
+        except InputError as error:
+            raise InputError(f"{path.name}: {error}") from error
         remarks = (*remarks, *mended)
     unit_mm = float(np.linalg.norm(file.from_file[:3, 0]))
     return PatientShape(mesh, f"{path.name}, {kind}", file.space, remarks, file.from_file, unit_mm)

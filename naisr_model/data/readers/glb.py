@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from naisr_model.data.readers.parts import NO_FACES, Parts, cut_off
+from naisr_model.data.readers.parts import NO_FACES, Parts, cut_off, trailing
 from naisr_model.errors import InputError
 
 _COMPRESSIONS = {"KHR_draco_mesh_compression": "Draco", "EXT_meshopt_compression": "meshopt"}
@@ -36,7 +36,8 @@ def read(name: str, content: bytes) -> Parts:
         )
     if not modes[_TRIANGLES] and not modes[_STRIP] and lines:
         return Parts(np.zeros((1, 3)), NO_FACES, lines)
-    scene = trimesh.load_scene(io.BytesIO(content), file_type="glb", process=False)
+    (length,) = struct.unpack_from("<I", content, 8)
+    scene = trimesh.load_scene(io.BytesIO(content[:length]), file_type="glb", process=False)
     dumped = scene.dump()
     surfaces = [part for part in dumped if isinstance(part, trimesh.Trimesh)]
     clouds = [part for part in dumped if isinstance(part, trimesh.PointCloud)]
@@ -46,7 +47,7 @@ def read(name: str, content: bytes) -> Parts:
     starts = np.cumsum([0, *(len(part.vertices) for part in surfaces)])
     points = np.concatenate([np.asarray(part.vertices, np.float64) for part in surfaces])
     faces = [np.asarray(part.faces, np.int64) + start for part, start in zip(surfaces, starts, strict=False)]
-    return Parts(points, np.concatenate(faces), lines)
+    return Parts(points, np.concatenate(faces), lines, trailing(len(content) - length))
 
 
 def _tree(name: str, content: bytes) -> dict[str, Any]:

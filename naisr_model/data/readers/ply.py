@@ -46,6 +46,9 @@ _TYPES = dict(
     ]
 )
 _CORNERS = ("vertex_indices", "vertex_index")
+_LISTED = ("vertex", "range_grid", "material")
+"""Elements that have lists and are no faces."""
+
 _BYTE_ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">"}
 
 
@@ -66,6 +69,7 @@ class _Element(NamedTuple):
 class _Columns(NamedTuple):
     """Of one element: numbers by property ``[rows]``; of each list its lengths ``[rows]`` and its values."""
 
+    rows: int
     numbers: dict[str, NDArray[np.float64]]
     lists: dict[str, tuple[NDArray[np.int64], NDArray[np.float64]]]
 
@@ -79,6 +83,7 @@ def read(name: str, content: bytes) -> Parts:
     order, elements, start = _header(name, content)
     source = _Text(content, start) if not order else _Binary(content, start, order)
     found = {element.name: _columns(name, source, element) for element in elements}
+    _refuse_unknown(name, elements)
     points = _points(name, found.get("vertex"))
     faces = [_polygons(name, points, found.get("face")), _strips(found.get("tristrips"))]
     check_indices(name, faces[1], len(points))
@@ -111,6 +116,18 @@ def _header(name: str, content: bytes) -> tuple[str, list[_Element], int]:
     if order is None:
         raise InputError(f"{name} does not say its format (ascii or binary); export it again")
     return order, elements, end.end()
+
+
+def _refuse_unknown(name: str, elements: Sequence[_Element]) -> None:
+    """Lists that are not known may be the faces under another name: then it is no cloud of points."""
+    names = {element.name for element in elements if element.rows}
+    strange = [
+        each.name for each in elements if each.rows and any(column.length for column in each.properties)
+    ]
+    if not names & {"face", "tristrips"} and (unknown := [each for each in strange if each not in _LISTED]):
+        raise InputError(
+            f"{name} has no faces and lists that are not known ('{unknown[0]}'); export it again"
+        )
 
 
 def _count(word: str) -> int:
@@ -235,7 +252,7 @@ class _Binary:
 def _columns(name: str, source: _Source, element: _Element) -> _Columns:
     """Take an element's rows, at once where all are of one length."""
     if not element.rows or not element.properties:
-        return _Columns({each.name: np.zeros(0) for each in element.properties}, {})
+        return _Columns(element.rows, {each.name: np.zeros(0) for each in element.properties}, {})
     start = source.at
     try:
         return _even(source, element) or _uneven(source, element)
@@ -277,7 +294,7 @@ def _even(source: _Source, element: _Element) -> _Columns | None:
         lists[each.name] = (np.full(element.rows, length, np.int64), values)
         column += 1 + length
     source.take(element.rows, types)
-    return _Columns(numbers, lists)
+    return _Columns(element.rows, numbers, lists)
 
 
 def _first_lengths(source: _Source, element: _Element) -> list[int]:
@@ -298,7 +315,7 @@ def _uneven(source: _Source, element: _Element) -> _Columns:
             lists[each.name] = (np.array([len(part) for part in parts], np.int64), values)
         else:
             numbers[each.name] = values
-    return _Columns(numbers, lists)
+    return _Columns(element.rows, numbers, lists)
 
 
 def _points(name: str, vertex: _Columns | None) -> NDArray[np.float64]:
@@ -312,6 +329,8 @@ def _polygons(name: str, points: NDArray[np.float64], face: _Columns | None) -> 
     lists = {} if face is None else face.lists
     corners = next((lists[key] for key in _CORNERS if key in lists), None)
     if corners is None:
+        if face is not None and face.rows:
+            raise InputError(f"{name} has faces without a list of vertices ({_CORNERS[0]}); export it again")
         return NO_FACES
     lengths, indices = corners
     if len(lengths) > 1 and not lengths[-2:].any():

@@ -279,7 +279,7 @@ def test_sheets_in_each_other_leave_the_outer_one(inner):
     assert mesh.volume == pytest.approx(BALL_MM3, rel=0.005)
     assert signed_distance(mesh, np.zeros((1, 3)))[0] == pytest.approx(-40, abs=0.2)
     (remark,) = remarks
-    assert (remark.severity, remark.topic) == ("look", "overlap") and "if they are cavities" in remark.text
+    assert (remark.severity, remark.topic) == ("look", "overlap") and "if that is a cavity" in remark.text
 
 
 def test_a_cavity_stays_and_is_no_overlap():
