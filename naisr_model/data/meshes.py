@@ -21,7 +21,7 @@ from scipy.spatial import cKDTree
 from naisr_model.data import formats
 from naisr_model.data.outside import outside
 from naisr_model.data.readers import glb, obj, ply, stl, vtk
-from naisr_model.data.readers.parts import Parts
+from naisr_model.data.readers.parts import Parts, check_indices
 from naisr_model.data.remarks import Remark
 from naisr_model.errors import InputError
 from naisr_model.exports import GLB_TO_MM
@@ -43,6 +43,18 @@ OVERLAP_SHARE = 5e-3
 
 FAR = 0.5
 """Pieces further from the main one than this share of its longest side are debris."""
+
+LARGEST = 1e9
+"""Of a coordinate, in any unit; what is larger is no length of a body."""
+
+LONGEST_GAP = 10
+"""Vertices at the origin, or faces that are nothing but a vertex, in a row: a stretch of zeros in the file."""
+
+SPIKE = 20.0
+"""Vertices further from the middle than so many times what nine of ten others are."""
+
+CRISS_CROSS = 15.0
+"""Area over that of the box around it, from which on it has no outside that means anything."""
 
 _READ: dict[str, Callable[[str, bytes], Parts]] = {
     "stl": stl.read,
@@ -150,11 +162,32 @@ def _parts(name: str, kind: str, content: bytes) -> Parts:
         raise InputError(f"{name} holds lines, no surface; export the surface itself")
     if not len(parts.points):
         raise InputError(f"{name} has no faces and no points; export it again")
-    if not np.isfinite(parts.points).all():
-        bad = int((~np.isfinite(parts.points)).any(axis=1).sum())
+    _refuse_damage(name, parts)
+    return parts
+
+
+def _refuse_damage(name: str, parts: Parts) -> None:
+    """What every format can suffer: no numbers, numbers of no size, stretches that were not copied."""
+    bad = int((~np.isfinite(parts.points)).any(axis=1).sum())
+    if bad:
         share = f"{bad:,} of {len(parts.points):,} vertices"
         raise InputError(f"{name} has {share} that are not finite numbers; export it again")
-    return parts
+    largest = float(np.abs(parts.points).max())
+    if largest > LARGEST:
+        raise InputError(
+            f"{name} has a coordinate of {largest:.2g}, so it is damaged; copy or export it again"
+        )
+    check_indices(name, parts.faces.ravel(), len(parts.points))
+    zeros = _longest_run(~parts.points.any(axis=1))
+    dots = _longest_run(np.asarray((parts.faces == parts.faces[:, :1]).all(axis=1)))
+    if max(zeros, dots) >= LONGEST_GAP:
+        what = f"{zeros:,} vertices" if zeros >= dots else f"{dots:,} faces"
+        raise InputError(f"{name} was not copied whole: {what} in a row are zeros; copy or export it again")
+
+
+def _longest_run(applies: NDArray[np.bool_]) -> int:
+    ends = np.flatnonzero(np.diff(np.concatenate([[0], applies.astype(np.int8), [0]])))
+    return int((ends[1::2] - ends[::2]).max(initial=0))
 
 
 def _stated_space(content: bytes) -> Literal["LPS", "RAS", ""]:
@@ -194,6 +227,11 @@ def mended_mesh(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, tuple[Remark, .
         return outer, (
             *said,
             Remark("look", "overlap", sentence, "if that is a cavity, turn its faces round"),
+        )
+    x, y, z = without_walls.extents
+    if without_walls.area > CRISS_CROSS * 2 * (x * y + y * z + z * x):
+        raise InputError(
+            "the faces cross each other all over the shape, so it has no outside; export it again"
         )
     whole, side_mm = outside(faced_outward(without_walls))
     sentence = (
@@ -421,9 +459,8 @@ def check_mesh(mesh: trimesh.Trimesh) -> tuple[Remark, ...]:
         raise InputError(f"the surface is open (opening {100 * opened:.0f} % of its area); close its holes")
     if is_flat(mesh):
         raise InputError("the surface encloses no volume; it must bound a body")
-    return tuple(
-        remark for remark in (opening(mesh), components(mesh), debris(mesh, far_points(mesh))) if remark
-    )
+    found = (opening(mesh), components(mesh), debris(mesh, far_points(mesh)), spikes(mesh))
+    return tuple(remark for remark in found if remark)
 
 
 def is_flat(mesh: trimesh.Trimesh) -> bool:
@@ -479,6 +516,17 @@ def debris(mesh: trimesh.Trimesh, far: NDArray[np.bool_]) -> Remark | None:
     share = 100 * _area_share(mesh, far)
     sentence = f"{share:.2g} % of it lies {away_mm.min():.0f} to {away_mm.max():.0f} mm from the main piece"
     return Remark("look", "debris", sentence, "remove them if they do not belong to the shape")
+
+
+def spikes(mesh: trimesh.Trimesh) -> Remark | None:
+    """What is to be said of vertices far out that hang together with the others."""
+    points = np.asarray(mesh.vertices, np.float64)
+    away = np.linalg.norm(points - np.median(points, axis=0), axis=1)
+    far = (away > SPIKE * np.quantile(away, 0.9)) & ~far_points(mesh)
+    if not far.any():
+        return None
+    sentence = f"{int(far.sum()):,} vertices lie up to {away[far].max():.3g} mm out, as spikes"
+    return Remark("look", "spikes", sentence, "export the surface again, or remove them")
 
 
 def _area_share(mesh: trimesh.Trimesh, points: NDArray[np.bool_]) -> float:

@@ -265,10 +265,8 @@ def _faults(patient: PatientShape, frame: Frame) -> list[_Fault]:
     if len(patient.mesh_mm.faces) > MOST_FACES:
         found.append(_too_fine(patient))
     elif not patient.is_cloud:
-        found += [
-            _inverted(patient),
-            *map(_unmended, (meshes.components(patient.mesh_mm), _opening(patient))),
-        ]
+        seen = (meshes.components(patient.mesh_mm), meshes.spikes(patient.mesh_mm), _opening(patient))
+        found += [_inverted(patient), *map(_unmended, seen)]
     return [fault for fault in found if fault]
 
 

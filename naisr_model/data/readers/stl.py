@@ -42,9 +42,6 @@ def _binary(name: str, content: bytes) -> Parts:
     if count > room:
         raise cut_off(name, "faces", count, room)
     corners = np.frombuffer(content, _FACE, count, _HEADER_BYTES)["corners"]
-    if count > 1 and not corners[-2:].any():
-        empty = count - int(np.flatnonzero(corners.any(axis=(1, 2))).max(initial=-1)) - 1
-        raise InputError(f"{name} was not copied whole: its last {empty:,} faces are zeros; copy it again")
     points, faces = _merged(corners.reshape(-1, 3))
     left = len(content) - _HEADER_BYTES - count * _FACE.itemsize
     return Parts(points, faces, remarks=trailing(rest if count == room else left))

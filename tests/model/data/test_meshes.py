@@ -341,3 +341,21 @@ def test_a_stated_space_is_told(tmp_path):
     path.write_bytes(binary_stl(block(), header=b"3D Slicer output. SPACE=RAS"))
     file = sound_mesh(path)
     assert file.space == "RAS" and [remark.topic for remark in file.remarks] == ["space"]
+
+
+def test_a_spike_is_told():
+    mesh = ball(40.0)
+    mesh.vertices[7] *= 50
+    (remark,) = check_mesh(repair_mesh(mesh))
+    assert (remark.severity, remark.topic) == (
+        "look",
+        "spikes",
+    ) and "1 vertices lie up to 2e+03 mm" in remark.text
+
+
+def test_faces_all_over_have_no_outside(tmp_path):
+    """Corners in another order: what a file is whose vertices were shifted by some bytes."""
+    mesh = ball(40.0)
+    mesh.vertices = np.random.default_rng(0).permutation(mesh.vertices)
+    with pytest.raises(InputError, match="cross each other all over the shape"):
+        mended_mesh(mesh)

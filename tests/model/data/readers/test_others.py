@@ -166,3 +166,30 @@ def test_what_is_written_is_read_the_same(tmp_path, ending):
     if ending == "glb":
         bounds = trimesh.load_scene(path).bounds
         np.testing.assert_allclose(bounds, [[-0.02, 0.06, -0.05], [0.04, 0.12, 0.01]], atol=1e-6)
+
+
+@pytest.mark.parametrize("ending", ["ply", "glb", "vtk"])
+def test_a_stretch_that_was_not_copied_is_refused(tmp_path, ending):
+    path = tmp_path / f"ball.{ending}"
+    mesh = trimesh.creation.icosphere(3, radius=30.0)
+    path.write_bytes(
+        legacy_vtk(mesh.vertices, {"POLYGONS": mesh.faces.tolist()}, True)
+        if ending == "vtk"
+        else mesh_bytes(mesh, ending)
+    )
+    content = path.read_bytes()
+    for at in (len(content) // 3, 2 * len(content) // 3):
+        path.write_bytes(content[:at] + bytes(600) + content[at + 600 :])
+        with pytest.raises(InputError, match=r"was not copied whole|missing vertices|do not add up"):
+            read_patient(path)
+
+
+def test_coordinates_of_no_size_and_missing_vertices_are_refused(tmp_path):
+    far = np.array(POINTS) / 1000
+    far[5] = 1e20
+    (tmp_path / "scan.glb").write_bytes(glb(far, FACES))
+    with pytest.raises(InputError, match=r"has a coordinate of 1e\+20, so it is damaged"):
+        read_patient(tmp_path / "scan.glb")
+    (tmp_path / "scan.glb").write_bytes(glb(POINTS / 1000, np.array(FACES) + 1))
+    with pytest.raises(InputError, match="name missing vertices"):
+        read_patient(tmp_path / "scan.glb")

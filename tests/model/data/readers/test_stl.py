@@ -114,5 +114,5 @@ def test_no_number_is_not_taken_for_one(tmp_path):
 
 def test_a_file_whose_end_was_not_copied_is_refused(tmp_path):
     content = binary_stl(block())
-    with pytest.raises(InputError, match="was not copied whole: its last 120 faces are zeros"):
+    with pytest.raises(InputError, match="was not copied whole: 120 faces in a row are zeros"):
         read_mesh(written(tmp_path, content[: -120 * 50] + bytes(120 * 50)))
