@@ -48,13 +48,13 @@ LARGEST = 1e9
 """Of a coordinate, in any unit; what is larger is no length of a body."""
 
 LONGEST_GAP = 10
-"""Vertices at the origin, or faces that are nothing but a vertex, in a row: a stretch of zeros in the file."""
+"""Vertices at the origin, or faces that are nothing but a vertex, in a row: zeros in the file."""
 
 SPIKE = 20.0
 """Vertices further from the middle than so many times what nine of ten others are."""
 
-CRISS_CROSS = 15.0
-"""Area over that of the box around it, from which on it has no outside that means anything."""
+CRISS_CROSS = 0.02
+"""Share of the area beside which a surface winds the wrong way round, from which on it has no outside."""
 
 _READ: dict[str, Callable[[str, bytes], Parts]] = {
     "stl": stl.read,
@@ -179,7 +179,7 @@ def _refuse_damage(name: str, parts: Parts) -> None:
         )
     check_indices(name, parts.faces.ravel(), len(parts.points))
     zeros = _longest_run(~parts.points.any(axis=1))
-    dots = _longest_run(np.asarray((parts.faces == parts.faces[:, :1]).all(axis=1)))
+    dots = _longest_run((parts.faces[:, 0] == parts.faces[:, 1]) & (parts.faces[:, 0] == parts.faces[:, 2]))
     if max(zeros, dots) >= LONGEST_GAP:
         what = f"{zeros:,} vertices" if zeros >= dots else f"{dots:,} faces"
         raise InputError(f"{name} was not copied whole: {what} in a row are zeros; copy or export it again")
@@ -228,11 +228,8 @@ def mended_mesh(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, tuple[Remark, .
             *said,
             Remark("look", "overlap", sentence, "if that is a cavity, turn its faces round"),
         )
-    x, y, z = without_walls.extents
-    if without_walls.area > CRISS_CROSS * 2 * (x * y + y * z + z * x):
-        raise InputError(
-            "the faces cross each other all over the shape, so it has no outside; export it again"
-        )
+    if (_windings(without_walls) < -0.5).any(axis=1).mean() > CRISS_CROSS:
+        raise InputError("the faces cross each other all over, so the shape has no outside; export it again")
     whole, side_mm = outside(faced_outward(without_walls))
     sentence = (
         f"{100 * share:.0f} % of the surface lies inside the shape or twice (pieces that overlap, double "
@@ -373,15 +370,20 @@ def overlap_share(mesh: trimesh.Trimesh) -> float:
     Just inside such a surface the winding number is 1 and just outside 0; where pieces overlap or sheets are
     double it is more, on both sides of a wall alike. Judged at :data:`OVERLAP_SAMPLES` points.
     """
+    return float((np.abs(_windings(mesh) - [1, 0]) >= 0.5).any(axis=1).mean())
+
+
+def _windings(mesh: trimesh.Trimesh) -> NDArray[np.float64]:
+    """Winding numbers just inside and just outside a surface, ``[n, 2]``; of what bounds no body those of one."""
     mesh = faced_outward(mesh)
     if not is_closed(mesh) or is_flat(mesh):
-        return 0.0
+        return np.array([[1.0, 0.0]])
     vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
     points, chosen = trimesh.sample.sample_surface(mesh, OVERLAP_SAMPLES, seed=0)
     step = _STEP * float(np.ptp(vertices, axis=0).max()) * np.asarray(mesh.face_normals)[chosen]
     within = _winding(vertices, faces, np.ascontiguousarray(points - step))
     beyond = _winding(vertices, faces, np.ascontiguousarray(points + step))
-    return float(1 - ((np.abs(within - 1) < 0.5) & (np.abs(beyond) < 0.5)).mean())
+    return np.stack([within, beyond], axis=1)
 
 
 OVERLAP_SAMPLES = 2000

@@ -12,13 +12,8 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from naisr_model.errors import InputError
-
 CELLS = 128
 """Along the longest side; the surface lies within a small part of a cell of where it should."""
-
-MOST_NEAR = 0.4
-"""Share of the lattice's nodes that may lie near a face; of sound surfaces a tenth do."""
 
 _BLOCK = 4
 
@@ -28,9 +23,6 @@ def outside(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, float]:
 
     Args:
         mesh: a closed surface or several, faces outward.
-
-    Raises:
-        InputError: when the faces fill most of space, as those of a damaged file do.
     """
     vertices = np.ascontiguousarray(mesh.vertices, np.float64)
     faces = np.ascontiguousarray(mesh.faces, np.int64)
@@ -41,12 +33,24 @@ def outside(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, float]:
     origin = low - side * _BLOCK * (1 - 1 / np.pi)
     values = _far_values(vertices, faces, origin, side, blocks)
     near = np.argwhere(np.isnan(values))
-    if len(near) > MOST_NEAR * values.size:
-        raise InputError(
-            "the faces cross each other all over the shape, so it has no outside; export it again"
-        )
-    values[tuple(near.T)] = _signed_distances(vertices, faces, origin + near * side)
+    inside = igl.fast_winding_number(vertices, faces, origin + near * side) > 0.5
+    values[tuple(near.T)] = np.where(inside, -side, side)
+    border = np.argwhere(_at_border(values < 0))
+    values[tuple(border.T)] = _signed_distances(vertices, faces, origin + border * side)
     return _contour(values, origin, side), side
+
+
+def _at_border(inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Nodes with a neighbour on the other side: only their distances say where the surface lies."""
+    border = np.zeros_like(inside)
+    for axis in range(inside.ndim):
+        before = [slice(None)] * inside.ndim
+        after = [slice(None)] * inside.ndim
+        before[axis], after[axis] = slice(None, -1), slice(1, None)
+        differ = inside[tuple(before)] != inside[tuple(after)]
+        border[tuple(before)] |= differ
+        border[tuple(after)] |= differ
+    return border
 
 
 def _far_values(
