@@ -41,7 +41,7 @@ SLIT_SHARE = 1e-4
 OVERLAP_SHARE = 5e-3
 """Of the area; where more of it lies inside the shape or twice, the outside is taken alone."""
 
-FAR = 0.5
+FAR = 1.0
 """Pieces further from the main one than this share of its longest side are debris."""
 
 LARGEST = 1e9
@@ -150,7 +150,10 @@ def _misnamed(kind: str) -> Remark:
 
 def _parts(name: str, kind: str, content: bytes) -> Parts:
     try:
-        parts = _READ[kind](name, content)
+        with np.errstate(
+            invalid="ignore", over="ignore"
+        ):  # of damaged files; what is no number is refused below
+            parts = _READ[kind](name, content)
     except InputError:
         raise
     except Exception as error:  # the readers raise whatever they like on damaged files
@@ -163,7 +166,13 @@ def _parts(name: str, kind: str, content: bytes) -> Parts:
     if not len(parts.points):
         raise InputError(f"{name} has no faces and no points; export it again")
     _refuse_damage(name, parts)
-    return parts
+    if len(parts.faces):
+        return parts
+    sentence = (
+        f"the {formats.MESHES[kind]} file holds points and no faces: it was taken for a cloud of points"
+    )
+    cloud = Remark("look", "cloud", sentence, "if it should be a surface, it is cut off: export it again")
+    return parts._replace(remarks=(*parts.remarks, cloud))
 
 
 def _refuse_damage(name: str, parts: Parts) -> None:
@@ -178,7 +187,7 @@ def _refuse_damage(name: str, parts: Parts) -> None:
             f"{name} has a coordinate of {largest:.2g}, so it is damaged; copy or export it again"
         )
     check_indices(name, parts.faces.ravel(), len(parts.points))
-    zeros = _longest_run(~parts.points.any(axis=1))
+    zeros = _longest_run(np.asarray(~parts.points.any(axis=1)))
     dots = _longest_run((parts.faces[:, 0] == parts.faces[:, 1]) & (parts.faces[:, 0] == parts.faces[:, 2]))
     if max(zeros, dots) >= LONGEST_GAP:
         what = f"{zeros:,} vertices" if zeros >= dots else f"{dots:,} faces"
@@ -374,7 +383,7 @@ def overlap_share(mesh: trimesh.Trimesh) -> float:
 
 
 def _windings(mesh: trimesh.Trimesh) -> NDArray[np.float64]:
-    """Winding numbers just inside and just outside a surface, ``[n, 2]``; of what bounds no body those of one."""
+    """Winding numbers just inside and just outside a surface, ``[n, 2]``; of what bounds no body 1 and 0."""
     mesh = faced_outward(mesh)
     if not is_closed(mesh) or is_flat(mesh):
         return np.array([[1.0, 0.0]])

@@ -55,8 +55,7 @@ def _is_plausible(content: bytes) -> bool:
 
 def _merged(corners: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Points that are written once a face, as shared ones."""
-    with np.errstate(invalid="ignore"):
-        numbers = np.ascontiguousarray(corners + np.float32(0.0))  # of -0 and 0 one
+    numbers = np.ascontiguousarray(corners + np.float32(0.0))  # of -0 and 0 one
     keys = numbers.view([("", numbers.dtype)] * 3).ravel()
     _, first, index = np.unique(keys, return_index=True, return_inverse=True)
     return numbers[first].astype(np.float64), index.reshape(-1, 3).astype(np.int64)

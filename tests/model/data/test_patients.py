@@ -71,6 +71,7 @@ def test_points_are_read_from_meshes_without_faces(tmp_path):
     for name in ("cloud.ply", "cloud.vtp", "cloud.obj"):
         patient = read_patient(tmp_path / name)
         assert patient.is_cloud and not patient.is_closed
+        assert [(remark.severity, remark.topic) for remark in patient.remarks] == [("look", "cloud")]
         np.testing.assert_allclose(patient.mesh_mm.vertices, points, atol=1e-4)
         assert check_patient(patient, FRAME) == ()
 
