@@ -20,6 +20,7 @@ from naisr_model.data.readers.parts import (
     from_strips,
     numbers_of,
     silent_vtk,
+    trailing,
     triangulated,
 )
 from naisr_model.errors import InputError
@@ -205,10 +206,16 @@ def read_xml(name: str, content: bytes) -> Parts:
         raise InputError(
             f"{name} is a VTK file of {dataset or 'an unknown kind'}; save the surface as VTP or STL"
         )
+    end = content.rfind(_XML_END) + len(_XML_END)
+    rest = len(content[end:].strip()) if end >= len(_XML_END) else 0
+    content = content[:end] if rest else content
     reader = readers[dataset]()
     reader.ReadFromInputStringOn()
     reader.SetInputString(content)  # type: ignore[call-overload]  # bytes will do
-    return _read_by_vtk(name, content, reader)
+    return _read_by_vtk(name, content, reader)._replace(remarks=trailing(rest))
+
+
+_XML_END = b"</VTKFile>"
 
 
 def _legacy_reader() -> Any:

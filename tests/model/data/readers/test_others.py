@@ -193,3 +193,12 @@ def test_coordinates_of_no_size_and_missing_vertices_are_refused(tmp_path):
     (tmp_path / "scan.glb").write_bytes(glb(POINTS / 1000, np.array(FACES) + 1))
     with pytest.raises(InputError, match="name missing vertices"):
         read_patient(tmp_path / "scan.glb")
+
+
+@pytest.mark.parametrize("ending", ["vtp", "glb", "ply", "stl"])
+def test_bytes_after_the_end_do_no_harm(tmp_path, ending):
+    path = tmp_path / f"block.{ending}"
+    path.write_bytes(mesh_bytes(BLOCK, ending) + b"signature 0123")
+    patient = read_patient(path)
+    assert patient.mesh_mm.volume == pytest.approx(240_000, rel=1e-6)
+    assert "trailing" in [remark.topic for remark in patient.remarks]
