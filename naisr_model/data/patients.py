@@ -322,7 +322,7 @@ def _guessed(fits: Mapping[str, float], sentence: str, unit_mm: float) -> _Fault
     guess = f"{sentence}, so its numbers look like {' or '.join(fits)}"
     if len(fits) > 1:
         choices = " or ".join(f"--scale {mm:g} for {unit}" for unit, mm in fits.items())
-        return _Fault(Remark("refuse", "units", guess, f"say which they are: {choices}"))
+        return _Fault(Remark("refuse", "units", guess, f"say which they are (Unit in the window): {choices}"))
     (mm,) = fits.values()
     done = f"{guess}: it was scaled by {mm / unit_mm:g}"
     return _Fault(
