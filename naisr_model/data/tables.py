@@ -16,9 +16,11 @@ that :mod:`naisr_model.data.sheets` reads will do. A TOML file with the same ste
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
 import os
+import re
 import tomllib
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -266,6 +268,39 @@ def _located(folder: Path, text: str) -> Path:
     if "\\" not in text or os.path.exists(written):
         return written
     return _located(folder, PureWindowsPath(text).as_posix())
+
+
+def require_file(path: Path) -> None:
+    """Make sure that a file that the table names is there.
+
+    Raises:
+        InputError: with what is there instead.
+    """
+    if os.path.exists(path):
+        return
+    text = str(path)
+    if re.search(r"(^|/)[A-Za-z]:/", text.replace("\\", "/")) and os.sep == "/":
+        raise InputError(f"{path} does not exist; it is a path of Windows, write it relative to the table")
+    if re.search(r"\b(https?|s3|ftp):/", text):
+        raise InputError(f"{path} does not exist; it is an address, copy the file beside the table")
+    with contextlib.suppress(OSError, ValueError):
+        for other in path.parent.iterdir():
+            if other.name.casefold() == path.name.casefold():
+                raise InputError(f"{path} does not exist; there is '{other.name}', so spell it alike")
+    raise InputError(f"{path} does not exist; correct the path")
+
+
+def missing_files(table: ShapeTable) -> tuple[str, ...]:
+    """A sentence for each file that the table names and that is not there."""
+    found = []
+    for row in table.rows:
+        for path in (row.mesh, row.landmarks):
+            try:
+                if path is not None:
+                    require_file(path)
+            except InputError as error:
+                found.append(f"row {row.number}: {error}")
+    return tuple(found)
 
 
 def _readings(
