@@ -183,10 +183,17 @@ def _missing_codes(values: NDArray[np.float64]) -> list[float]:
         return []
     whole = bool((rest == np.round(rest)).all())
     apart = [code for code in there if _stands_apart(code, rest, whole)]
-    zero_is_odd = (values == 0).any() and len(rest[rest > 0]) and (rest >= 0).all()
-    if zero_is_odd and rest[rest > 0].min() > 0.1 * np.median(rest) and len(np.unique(rest)) > FEW_CODES:
+    if (values == 0).any() and _is_odd_zero(rest[rest != 0]):
         apart.append(0.0)
     return apart
+
+
+def _is_odd_zero(rest: NDArray[np.float64]) -> bool:
+    """Whether 0 lies far below values that are all positive and lie close together."""
+    distinct = np.unique(rest)
+    if len(distinct) < FEW_CODES or distinct[0] <= 0:
+        return False
+    return bool(distinct[0] > max(0.25 * np.median(rest), 5 * np.median(np.diff(distinct))))
 
 
 def _stands_apart(code: float, rest: NDArray[np.float64], whole: bool) -> bool:

@@ -7,6 +7,7 @@ do not hide each other.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -24,7 +25,7 @@ from naisr_model.data.tables import TableRow
 Remarks = list[list[Remark]]
 """What is said of each row."""
 
-POINTS = 300
+POINTS = 1000
 """Of a surface, for :class:`Bulk`."""
 
 HUMAN_MM = (1.0, 3000.0)
@@ -252,9 +253,7 @@ def _scale(rest: NDArray[np.float64], floor: float, usual: NDArray[np.bool_]) ->
 
 
 def _another_size(bulk: Bulk, ratio: float, certain: bool) -> Remark:
-    sentence = (
-        f"the mesh is {bulk.length_mm:.3g} mm long, {_times(ratio)} as large as the others at such covariates"
-    )
+    sentence = f"the mesh is {bulk.length_mm:.3g} mm long, {_compared(ratio)} usual at such covariates"
     fits = [unit for unit, factor in UNITS_MM.items() if abs(np.log(ratio * factor)) < np.log(1.6)]
     remedy = "look at its unit, which must be millimetres, and at its covariates"
     if fits:
@@ -263,23 +262,25 @@ def _another_size(bulk: Bulk, ratio: float, certain: bool) -> Remark:
 
 
 def _another_volume(bulk: Bulk, ratio: float) -> Remark:
-    sentence = (
-        f"the volume of {bulk.volume_mm3 / 1000:.3g} cm³ is {_times(ratio)} the usual one at such covariates"
-    )
+    volume = f"the volume is {bulk.volume_mm3 / 1000:.3g} cm³"
+    sentence = f"{volume}, {_compared(ratio)} usual at such covariates"
     return Remark("look", "volume", sentence, "look whether it is whole, and at its covariates")
 
 
 def _with_debris(bulk: Bulk, bulks: Sequence[Bulk]) -> Remark:
     usual = np.median([one.length_mm for one in bulks])
     sentence = (
-        f"the mesh is {bulk.length_mm:.0f} mm long, usual are {usual:.0f} mm, and its bulk is like that of the "
-        f"others, so pieces lie far from the rest"
+        f"the mesh is {bulk.length_mm:.0f} mm long, usual are {usual:.0f} mm, and its bulk is like that of "
+        f"the others, so pieces lie far from the rest"
     )
     return Remark("refuse", "debris", sentence, "remove them, or the others lose resolution")
 
 
-def _times(ratio: float) -> str:
-    return f"{ratio:.3g} times" if ratio >= 1 else f"a {1 / ratio:.3g}th"
+def _compared(ratio: float) -> str:
+    """``3.2 times as large as``, ``1,080 times smaller than``."""
+    times = max(ratio, 1 / ratio)
+    number = f"{times:,.0f}" if times >= 100 else f"{times:.2g}"
+    return f"{number} times as large as" if ratio >= 1 else f"{number} times smaller than"
 
 
 # --- landmarks ---------------------------------------------------------------------------------
@@ -330,8 +331,11 @@ def _radius(points: NDArray[np.float64]) -> float:
 
 
 def _middle(sets: Sequence[Landmarks]) -> Landmarks:
-    """The set that is most like the others, of up to 25 tried."""
-    tried = [sets[i] for i in np.unique(np.linspace(0, len(sets) - 1, 25).astype(int))]
+    """The set that is most like the others, of up to 25 tried that have what most have."""
+    counts = Counter(name for one in sets for name in one)
+    usual = {name for name, count in counts.items() if 2 * count > len(sets)}
+    whole = [one for one in sets if usual <= set(one)] or list(sets)
+    tried = [whole[i] for i in np.unique(np.linspace(0, len(whole) - 1, 25).astype(int))]
     return min(tried, key=lambda one: float(np.median([_residual(other, one) for other in sets])))
 
 
@@ -361,8 +365,8 @@ def _distances(
 def _odd_landmarks(one: _Marked, middle: Landmarks, usual: float, spread: float, away: float) -> list[Remark]:
     """At most one remark: the first that explains the row."""
     if abs(np.log(one.spread) - spread) > np.log(3.0):
-        times = _times(float(np.exp(np.log(one.spread) - spread)))
-        sentence = f"the landmarks are {times} as far apart, beside the mesh, as those of the others"
+        ratio = float(np.exp(np.log(one.spread) - spread))
+        sentence = f"the spread of the landmarks beside the mesh is {_compared(ratio)} usual"
         return [Remark("refuse", "landmarks", sentence, "give them in the unit of the mesh, millimetres")]
     if one.away > 5 * max(away, 0.5):
         mm = one.away * one.bulk.radius_mm
@@ -373,20 +377,27 @@ def _odd_landmarks(one: _Marked, middle: Landmarks, usual: float, spread: float,
     names, distances = _distances(one.points, middle)
     rest = _residual(one.points, middle)
     if rest <= max(2.5 * usual, 0.02):
-        return []
-    if _residual(one.points, middle, mirrored=True) < 0.5 * rest:
-        return [
-            Remark("refuse", "landmarks", "the landmarks are mirrored", "give them in the frame of the mesh")
-        ]
+        return _incomplete(one.points, middle)
     pair = min(combinations(names, 2), key=lambda two: _residual(_swapped(one.points, *two), middle))
-    if _residual(_swapped(one.points, *pair), middle) < 0.5 * rest:
+    swapped = _residual(_swapped(one.points, *pair), middle)
+    mirrored = _residual(one.points, middle, mirrored=True)
+    if mirrored < min(swapped, 0.5 * rest):
+        sentence = "the landmarks are mirrored"
+        return [Remark("refuse", "landmarks", sentence, "give them in the frame of the mesh")]
+    if swapped < 0.5 * rest:
         sentence = f"the landmarks '{pair[0]}' and '{pair[1]}' look swapped"
         return [Remark("refuse", "landmarks", sentence, "exchange their names")]
     if rest <= max(5 * usual, 0.1):
-        return []
+        return _incomplete(one.points, middle)
     worst = names[int(distances.argmax())]
     sentence = f"the landmarks lie otherwise than those of the others, most of all '{worst}'"
     return [Remark("refuse", "landmarks", sentence, "set them again")]
+
+
+def _incomplete(points: Landmarks, middle: Landmarks) -> list[Remark]:
+    missing = ", ".join(f"'{name}'" for name in middle if name not in points)
+    sentence = f"it has no landmark {missing}, which others have"
+    return [Remark("look", "landmarks", sentence, "set it for a better alignment")] if missing else []
 
 
 def _swapped(points: Landmarks, one: str, other: str) -> Landmarks:
@@ -417,10 +428,8 @@ def compared_places(
     length = float(np.median([one.bulk.length_mm for one in lying]))
     away = np.linalg.norm(centres - middle, axis=1)
     usual = max(float(np.median(away)), 0.15 * length)
-    reference = min(
-        lying, key=lambda one: abs(one.bulk.volume_mm3 - np.median([x.bulk.volume_mm3 for x in lying]))
-    )
-    misfits = np.array([_misfit(one.points_mm, reference.points_mm) for one in lying])
+    reference = _typical(lying)
+    misfits = np.array([_misfit(one.points_mm, reference) for one in lying])
     for number, (i, one) in enumerate(zip(there, lying, strict=True)):
         flip = _flip(one, reference, float(misfits[number]), float(np.median(misfits)))
         if flip:
@@ -429,6 +438,14 @@ def compared_places(
         elif away[number] > 5 * usual:
             found[i].append(_elsewhere(float(away[number]), usual, bool(away[number] > 10 * usual)))
     return found
+
+
+def _typical(lying: Sequence[_Lying]) -> _Lying:
+    """Of some meshes of about median volume the one that lies most like the others."""
+    middle = np.median([one.bulk.volume_mm3 for one in lying])
+    tried = sorted(lying, key=lambda one: abs(one.bulk.volume_mm3 - middle))[:5]
+    misfits = [np.median([_misfit(other.points_mm, one) for other in lying]) for one in tried]
+    return tried[int(np.argmin(misfits))]
 
 
 @dataclass(frozen=True, eq=False)
@@ -444,9 +461,12 @@ class _Lying:
         return np.asarray(points_mm @ self.transform[:3, :3].T + self.transform[:3, 3])
 
 
-def _misfit(points_mm: NDArray[np.float64], reference_mm: NDArray[np.float64]) -> float:
-    """Mean distance to the nearest of the other's points, both ways."""
-    to, back = cKDTree(reference_mm).query(points_mm)[0], cKDTree(points_mm).query(reference_mm)[0]
+def _misfit(points_mm: NDArray[np.float64], reference: _Lying) -> float:
+    """Mean distance to the nearest point of the other, both ways, once it is as large as the reference."""
+    centre = points_mm.mean(axis=0)
+    scale = _radius(reference.points_mm) / max(_radius(points_mm), 1e-12)
+    sized, goal = (points_mm - centre) * scale + centre, reference.points_mm
+    to, back = cKDTree(goal).query(sized)[0], cKDTree(sized).query(goal)[0]
     return float(to.mean() + back.mean()) / 2
 
 
@@ -464,7 +484,7 @@ def _flipped_misfit(one: _Lying, reference: _Lying, signs: NDArray[np.float64]) 
     points, moved = one.bulk.points_mm, one.points_mm
     centre = moved.mean(axis=0)
     flips = (one.moved(points * signs), (moved - centre) * signs + centre)
-    return min(_misfit(flipped, reference.points_mm) for flipped in flips)
+    return min(_misfit(flipped, reference) for flipped in flips)
 
 
 def _elsewhere(away_mm: float, usual_mm: float, certain: bool) -> Remark:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -53,7 +53,8 @@ def read_markups(path: Path, space: Space) -> dict[str, tuple[float, float, floa
         raise InputError(f"landmarks {path.name}: {error}") from error
     signs = (1.0, 1.0, 1.0) if stated == space else (-1.0, -1.0, 1.0)
     _require_each_once(path, [point.name for point in points])
-    return _require_apart(path, {point.name: _coordinates(path, point, points, signs) for point in points})
+    marks = decimal_marks(str(value) for point in points for value in point.coordinates)
+    return _require_apart(path, {point.name: _coordinates(path, point, marks, signs) for point in points})
 
 
 def _require_each_once(path: Path, names: Sequence[str]) -> None:
@@ -65,18 +66,18 @@ def _require_each_once(path: Path, names: Sequence[str]) -> None:
 
 
 def _coordinates(
-    path: Path, point: NamedPoint, points: Iterable[NamedPoint], signs: Sequence[float]
+    path: Path, point: NamedPoint, marks: Collection[str], signs: Sequence[float]
 ) -> tuple[float, float, float]:
-    marks = decimal_marks(str(value) for one in points for value in one.coordinates)
-    try:
-        x, y, z = (
-            sign * read_number(str(value), marks)
-            for value, sign in zip(point.coordinates, signs, strict=True)
-        )
-    except ValueError as error:
-        raise InputError(
-            f"landmarks {path.name} must have the columns name,x,y,z with numbers; {point.place} is not so"
-        ) from error
+    numbers = []
+    for value, sign in zip(point.coordinates, signs, strict=True):
+        try:
+            numbers.append(sign * read_number(str(value), marks))
+        except ValueError as error:
+            raise InputError(
+                f"landmarks {path.name} must have the columns name,x,y,z with numbers; "
+                f"{point.place} has '{value}'{error}"
+            ) from error
+    x, y, z = numbers
     if max(abs(x), abs(y), abs(z)) > FARTHEST_MM:
         raise InputError(
             f"landmarks {path.name}: '{point.name}' is at {x:g}, {y:g}, {z:g}, beyond any scanner; correct it"
@@ -91,9 +92,8 @@ def _require_apart(
     for name, point in landmarks.items():
         if (other := seen.setdefault(point, name)) != name:
             x, y, z = point
-            raise InputError(
-                f"landmarks {path.name} has '{other}' and '{name}' both at {x:g}, {y:g}, {z:g}; set them again"
-            )
+            both = f"'{other}' and '{name}' both at {x:g}, {y:g}, {z:g}"
+            raise InputError(f"landmarks {path.name} has {both}; set them again")
     return landmarks
 
 
@@ -136,6 +136,11 @@ def _fiducials(path: Path) -> tuple[str, list[NamedPoint]]:
     return _FCSV_SPACES[stated], points
 
 
+def _three(position: Sequence[Any]) -> list[Any]:
+    x, y, z = position
+    return [x, y, z]
+
+
 def _markups_json(path: Path) -> tuple[str, list[NamedPoint]]:
     """Slicer's ``.mrk.json``; points that were announced and never set are left out."""
     try:
@@ -144,7 +149,7 @@ def _markups_json(path: Path) -> tuple[str, list[NamedPoint]]:
         stated = str(markup.get("coordinateSystem", "RAS")).upper()
         unit = str(markup.get("coordinateUnits", "mm"))
         points = [
-            NamedPoint(f"control point {number}", str(point["label"]).strip(), list(point["position"]))
+            NamedPoint(f"control point {number}", str(point["label"]).strip(), _three(point["position"]))
             for number, point in enumerate(markup["controlPoints"], start=1)
             if point.get("positionStatus", "defined") == "defined"
         ]

@@ -38,7 +38,7 @@ from naisr_model.errors import InputError
 from naisr_model.files import replacing
 from naisr_model.frames import Frame, enclosing_frame
 from naisr_model.progress import SILENT, Progress
-from naisr_model.work.run import in_order, processes
+from naisr_model.work.run import Run, in_order, processes
 
 REPORT = "report.json"
 _OWN_NAME = re.compile(r"[0-9a-f]{24}|\.[0-9a-f]{24}\.\d+\.tmp")
@@ -95,12 +95,7 @@ def prepare(
         held_out = held_out_mask([row.subject for row in table.rows], options.held_out, options.seed)
         looks = [(row, table.alignment.method) for row in table.rows]
         inputs = _beside_each_other(table, in_order(run(inspect, looks, progress.part(0.0, 0.05))))
-        with _telling_rejected(table, [look.remarks for look in inputs]):
-            alignment = _reference(table, inputs, held_out)
-        whole = [i for i, look in enumerate(inputs) if not _refused(look.remarks)]
-        places = [(alignment, table.rows[i].mesh, inputs[i].landmarks) for i in whole]
-        found = in_order(run(place, places, progress.part(0.05, 0.1)))
-        placed = _in_one_frame(inputs, dict(zip(whole, found, strict=True)))
+        alignment, placed = _aligned(table, inputs, held_out, run, progress.part(0.05, 0.1))
         with _telling_rejected(table, [item.remarks for item in placed]):
             usable = _usable(table, placed)
             population = tables.population_from_table(table.take(usable), held_out[usable])
@@ -209,6 +204,25 @@ def _named_alike(looks: Sequence[Look]) -> list[align.Landmarks | None]:
         look.landmarks and {names[name.casefold()]: point for name, point in look.landmarks.items()}
         for look in looks
     ]
+
+
+def _aligned(
+    table: ShapeTable, looks: Sequence[Look], held_out: NDArray[np.bool_], run: Run, progress: Progress
+) -> tuple[Alignment, list[Placed]]:
+    """The reference and every row in its frame; again without what turns out to lie wrong in it."""
+    while True:
+        with _telling_rejected(table, [look.remarks for look in looks]):
+            alignment = _reference(table, looks, held_out)
+        whole = [i for i, look in enumerate(looks) if not _refused(look.remarks)]
+        places = [(alignment, table.rows[i].mesh, looks[i].landmarks) for i in whole]
+        found = in_order(run(place, places, progress))
+        placed = _in_one_frame(looks, dict(zip(whole, found, strict=True)))
+        wrong = [i for i in whole if _refused(placed[i].remarks)]
+        if alignment.method == "none" or held_out[wrong].all():
+            return alignment, placed
+        looks = [
+            look._replace(remarks=placed[i].remarks) if i in wrong else look for i, look in enumerate(looks)
+        ]
 
 
 def _in_one_frame(looks: Sequence[Look], found: Mapping[int, Placed]) -> list[Placed]:
