@@ -414,10 +414,12 @@ def compared_places(
 
     Args:
         bulks: of each row's mesh.
-        transforms: 4x4, coordinates of the mesh to the atlas frame; None for rows that cannot be used.
+        transforms: 4x4, coordinates of the mesh to the atlas frame; None for rows that cannot be used, and
+            empty to compare nothing.
     """
     found: Remarks = [[] for _ in bulks]
-    there = [i for i, transform in enumerate(transforms) if transform is not None and bulks[i] is not None]
+    pairs = zip(bulks, transforms, strict=False)
+    there = [i for i, pair in enumerate(pairs) if pair[0] is not None and pair[1] is not None]
     if len(there) < FEWEST_ROWS:
         return found
     lying = [
@@ -446,6 +448,15 @@ def _typical(lying: Sequence[_Lying]) -> _Lying:
     tried = sorted(lying, key=lambda one: abs(one.bulk.volume_mm3 - middle))[:5]
     misfits = [np.median([_misfit(other.points_mm, one) for other in lying]) for one in tried]
     return tried[int(np.argmin(misfits))]
+
+
+def centred(bulk: Bulk | None) -> NDArray[np.float64] | None:
+    """The shift that puts the middle of a mesh at 0, 4x4."""
+    if bulk is None:
+        return None
+    shift = np.eye(4)
+    shift[:3, 3] = -bulk.points_mm.mean(axis=0)
+    return shift
 
 
 @dataclass(frozen=True, eq=False)

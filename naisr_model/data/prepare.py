@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from naisr_model.data import align, meshes, samples, store, tables
 from naisr_model.data.align import Alignment
 from naisr_model.data.comparison import (
+    centred,
     compared_landmarks,
     compared_places,
     compared_shapes,
@@ -190,7 +191,11 @@ def _beside_each_other(table: ShapeTable, looks: Sequence[Look]) -> list[Look]:
     bulks = [look.bulk for look in looks]
     shapes = compared_shapes(table.rows, bulks, [look.space for look in looks], table.values)
     marks = compared_landmarks([look.landmarks for look in looks], bulks)
-    said = [(*look.remarks, *found) for look, found in zip(looks, joined(shapes, marks), strict=True)]
+    # One that lies the other way round would become what all are moved onto, or stay as it is.
+    turned = compared_places(
+        bulks, [centred(bulk) for bulk in bulks] if table.alignment.method == "icp" else []
+    )
+    said = [(*look.remarks, *found) for look, found in zip(looks, joined(shapes, marks, turned), strict=True)]
     return [look._replace(remarks=remarks) for look, remarks in zip(looks, said, strict=True)]
 
 
