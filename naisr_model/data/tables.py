@@ -283,10 +283,11 @@ def require_file(path: Path) -> None:
         raise InputError(f"{path} does not exist; it is a path of Windows, write it relative to the table")
     if re.search(r"\b(https?|s3|ftp):/", text):
         raise InputError(f"{path} does not exist; it is an address, copy the file beside the table")
-    with contextlib.suppress(OSError, ValueError):
-        for other in path.parent.iterdir():
-            if other.name.casefold() == path.name.casefold():
-                raise InputError(f"{path} does not exist; there is '{other.name}', so spell it alike")
+    names: list[str] = []
+    with contextlib.suppress(OSError):
+        names = os.listdir(path.parent)
+    if alike := [name for name in names if name.casefold() == path.name.casefold()]:
+        raise InputError(f"{path} does not exist; there is '{alike[0]}', so spell it alike")
     raise InputError(f"{path} does not exist; correct the path")
 
 
