@@ -221,14 +221,11 @@ def _expected(
 ) -> NDArray[np.float64]:
     """What covariates make expected: least squares with Tukey's weights on them and their squares.
 
-    With few rows a cell of covariates is a handful of people, and the median has to do.
+    With few rows squares have to be left out, and with very few the median has to do.
     """
-    columns = [np.ones(len(numbers))]
-    for column in values.T:
-        spread = column.std()
-        scaled = (column - column.mean()) / (spread or 1.0)
-        columns += [scaled] if len(np.unique(column)) < 3 else [scaled, scaled**2]
-    design = np.stack(columns, axis=1)
+    design = _design(values, squares=True)
+    if usual.sum() < 4 * design.shape[1]:
+        design = _design(values, squares=False)
     if usual.sum() < 4 * design.shape[1]:
         return np.full(len(numbers), np.median(numbers[usual]) if usual.any() else np.median(numbers))
     weights = usual.astype(np.float64)
@@ -244,6 +241,15 @@ def _expected(
         )
         weights = usual * robust
     return np.asarray(design @ solution)
+
+
+def _design(values: NDArray[np.float64], *, squares: bool) -> NDArray[np.float64]:
+    """1, each covariate in standard deviations, and its square where it has more than two values."""
+    columns = [np.ones(len(values))]
+    for column in values.T:
+        scaled = (column - column.mean()) / (column.std() or 1.0)
+        columns += [scaled, scaled**2] if squares and len(np.unique(column)) > 2 else [scaled]
+    return np.stack(columns, axis=1)
 
 
 def _scale(rest: NDArray[np.float64], floor: float, usual: NDArray[np.bool_]) -> float:

@@ -190,7 +190,10 @@ def _beside_each_other(table: ShapeTable, looks: Sequence[Look]) -> list[Look]:
     looks = [look._replace(landmarks=marks) for look, marks in zip(looks, _named_alike(looks), strict=True)]
     bulks = [look.bulk for look in looks]
     shapes = compared_shapes(table.rows, bulks, [look.space for look in looks], table.values)
-    marks = compared_landmarks([look.landmarks for look in looks], bulks)
+    sound = [
+        look.landmarks if not _refused(found) else None for look, found in zip(looks, shapes, strict=True)
+    ]
+    marks = compared_landmarks(sound, bulks)
     # One that lies the other way round would become what all are moved onto, or stay as it is.
     turned = compared_places(
         bulks, [centred(bulk) for bulk in bulks] if table.alignment.method == "icp" else []

@@ -1,4 +1,4 @@
-"""Cohorts with one row that does not belong: what ``naisr prepare`` says of it, and that it spoils nothing."""
+"""Cohorts with a row that does not belong: what ``naisr prepare`` says of it, and that it spoils nothing."""
 
 from __future__ import annotations
 
@@ -87,8 +87,9 @@ def elsewhere(person: Person, _people) -> None:
     person.mesh.apply_translation([0, 400, 0])
 
 
-def without_most(person: Person, _people) -> None:
-    person.mesh = person.mesh.slice_plane(person.mesh.centroid + [0, 0, 8], [0, 0, 1], cap=True)
+def thinner(person: Person, _people) -> None:
+    centre = person.mesh.centroid
+    person.mesh.vertices = centre + (person.mesh.vertices - centre) * [0.4, 0.4, 1]
 
 
 def of_the_third(person: Person, people, file: str | None = None) -> None:
@@ -165,9 +166,11 @@ def test_one_mesh_for_two_visits_of_a_subject_is_told(prepared):
     assert "the mesh is that of row 4, another visit of the same subject" in said
 
 
-def test_a_piece_of_a_mesh_is_told(prepared):
-    _, report, _ = prepared("landmarks", p11=without_most)
-    assert {remark["row"] for remark in (*report["warnings"], *report["rejected"])} == {13}
+def test_another_volume_than_at_such_covariates_is_told(prepared):
+    _, report, store = prepared("landmarks", p11=thinner)
+    assert [(remark["row"], remark["topic"]) for remark in report["warnings"]] == [(13, "volume")]
+    assert "times smaller than usual at such covariates" in report["warnings"][0]["reason"]
+    assert len(store) == PEOPLE
 
 
 def changed_marks(change):
