@@ -11,6 +11,7 @@ import csv
 import io
 import itertools
 import math
+import os
 import re
 import warnings
 from collections import Counter
@@ -19,6 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from naisr_model.data import formats
 from naisr_model.data.remarks import Remark
 from naisr_model.errors import InputError
 
@@ -191,20 +193,14 @@ def read_text(path: str | Path) -> tuple[str, tuple[Remark, ...]]:
 
 
 def _bytes(path: Path) -> bytes:
-    if path.is_dir():
-        raise InputError(f"{path} is a folder; give the file of the table")
-    if not path.exists():
-        raise InputError(f"{path} does not exist; correct the path")
-    if not path.is_file():
-        raise InputError(f"{path} is no ordinary file; save the table as one")
-    try:
-        if path.stat().st_size > LARGEST_BYTES:
-            raise InputError(
-                f"{path.name} has over {LARGEST_BYTES // 1_000_000} MB, so it is no table; correct the path"
-            )
-        return path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path} cannot be read ({error.strerror}); make it readable") from error
+    if os.path.isfile(path) and not os.path.getsize(path):
+        return b""
+    content = formats.content_of(path)
+    if len(content) > LARGEST_BYTES:
+        raise InputError(
+            f"{path.name} has over {LARGEST_BYTES // 10**6} MB and is no table; correct the path"
+        )
+    return content
 
 
 def decoded(path: Path, data: bytes) -> tuple[str, tuple[Remark, ...]]:

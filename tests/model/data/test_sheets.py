@@ -34,7 +34,7 @@ def as_numbers(text: str):
     return [[float(cell) if cell.replace(".", "").isdigit() else cell for cell in row] for row in rows]
 
 
-DRESSES = {
+DRESSES: dict[str, str | bytes] = {
     "commas": COMMAS,
     "semicolons and decimal commas": SEMICOLONS,
     "Excel's line": "sep=;\n" + SEMICOLONS,
@@ -109,7 +109,7 @@ def test_what_excel_made_of_a_cell_is_told(tmp_path):
     assert "'#N/A' in row 3" in str(caught.value)
 
 
-NO_TABLES = {
+NO_TABLES: dict[str, tuple[bytes, str]] = {
     "a web page": (b"<!DOCTYPE html><html>", "web page"),
     "compressed": (gzip.compress(COMMAS.encode()), "unpack"),
     "an old workbook": (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(500), "save it as .xlsx"),
