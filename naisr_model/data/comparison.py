@@ -82,8 +82,9 @@ class Bulk:
 
     @property
     def radius_mm(self) -> float:
-        """Root mean square distance of the surface from its centre."""
-        return float(np.linalg.norm(self.spreads_mm))
+        """Median distance of the surface from its middle, which pieces far away do not change."""
+        middle = np.median(self.points_mm, axis=0)
+        return float(np.median(np.linalg.norm(self.points_mm - middle, axis=1)))
 
 
 def measured(mesh_mm: trimesh.Trimesh) -> Bulk:
@@ -194,14 +195,17 @@ def _odd_sizes(bulks: Sequence[Bulk], values: NDArray[np.float64]) -> Remarks:
     volume = np.log([bulk.volume_mm3 for bulk in bulks])
     beside = volume - _expected(volume, values, usual & ~refused)
     odd_volume = np.abs(beside) > np.maximum(FAR_OFF * _scale(beside, 0.1, usual & ~refused), ODD_VOLUME)
+    slender = np.array([bulk.length_mm / bulk.radius_mm for bulk in bulks])
     for i, bulk in enumerate(bulks):
         ratio = float(np.exp(size[i] - expected[i]))
-        if refused[i] or odd[i]:
-            found[i].append(_another_size(bulk, ratio, bool(refused[i])))
+        if refused[i]:
+            found[i].append(_another_size(bulk, ratio, True))
+        elif slender[i] > LONG * np.median(slender):
+            found[i].append(_with_debris(bulk, bulks))
+        elif odd[i]:
+            found[i].append(_another_size(bulk, ratio, False))
         elif odd_volume[i]:
             found[i].append(_another_volume(bulk, float(np.exp(beside[i]))))
-        elif bulk.length_mm / bulk.radius_mm > LONG * np.median([b.length_mm / b.radius_mm for b in bulks]):
-            found[i].append(_with_debris(bulk, bulks))
     return found
 
 

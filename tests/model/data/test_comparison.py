@@ -162,7 +162,7 @@ def test_one_mesh_for_two_visits_of_a_subject_is_told(prepared):
 
     said, report, store = prepared("none", p5=again)
     assert (report["rejected"], len(store)) == ([], PEOPLE)
-    assert [remark["row"] for remark in report["warnings"]] == [4, 7]
+    assert [one["row"] for one in report["warnings"] if one["topic"] == "repeated"] == [4, 7]
     assert "the mesh is that of row 4, another visit of the same subject" in said
 
 
