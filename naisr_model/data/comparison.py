@@ -47,7 +47,7 @@ ODD_SIZE, ODD_VOLUME = np.log(1.4), np.log(2.0)
 FAR_OFF = 6.0
 """Standard deviations, estimated from the median absolute deviation."""
 
-LONG = 2.0
+LONG = 3.0
 """Length over bulk, as a multiple of the others', from which pieces lie far from the rest."""
 
 FLIPS = {
