@@ -379,11 +379,14 @@ def _odd_landmarks(one: _Marked, middle: Landmarks, usual: float, spread: float,
         sentence = f"the spread of the landmarks beside the mesh is {_compared(ratio)} usual"
         return [Remark("refuse", "landmarks", sentence, "give them in the unit of the mesh, millimetres")]
     if one.away > 5 * max(away, 0.5):
-        mm = one.away * one.bulk.radius_mm
-        sentence = (
-            f"the landmarks lie {mm:.0f} mm from the middle of the mesh, further than those of the others"
-        )
-        return [Remark("refuse", "landmarks", sentence, "give both in one frame, LPS or RAS")]
+        away_mm = one.away * one.bulk.radius_mm
+        sentence = f"the landmarks lie {away_mm:.0f} mm from the middle of the mesh, farther than usual"
+        certain = away_mm > one.bulk.length_mm
+        return [
+            Remark(
+                "refuse" if certain else "look", "landmarks", sentence, "give both in one frame, LPS or RAS"
+            )
+        ]
     names, distances = _distances(one.points, middle)
     rest = _residual(one.points, middle)
     if rest <= max(2.5 * usual, 0.02):
