@@ -34,7 +34,7 @@ HUMAN_MM = (1.0, 3000.0)
 FEWEST_ROWS = 5
 """With fewer rows nobody can say which of them is the odd one."""
 
-SAME = 2e-5
+SAME = 2e-6
 """Relative difference of volumes, areas and moments up to which two meshes are the same, perhaps moved; what
 is left of the digits in a text file. Two people differ in the second digit."""
 
@@ -49,6 +49,10 @@ FAR_OFF = 6.0
 
 LONG = 3.0
 """Length over bulk, as a multiple of the others', from which pieces lie far from the rest."""
+
+MISPLACED = 0.4
+"""How far a landmark may lie from where the others have it, over the radius of all landmarks; anatomy takes
+half of it."""
 
 FLIPS = {
     "turned by half about z, as RAS is to LPS": (-1.0, -1.0, 1.0),
@@ -400,11 +404,12 @@ def _odd_landmarks(one: _Marked, middle: Landmarks, usual: float, spread: float,
     if swapped < 0.5 * rest:
         sentence = f"the landmarks '{pair[0]}' and '{pair[1]}' look swapped"
         return [Remark("refuse", "landmarks", sentence, "exchange their names")]
-    if rest <= max(5 * usual, 0.1):
+    if rest <= max(5 * usual, 0.15):
         return _incomplete(one.points, middle)
     worst = names[int(distances.argmax())]
     sentence = f"the landmarks lie otherwise than those of the others, most of all '{worst}'"
-    return [Remark("refuse", "landmarks", sentence, "set them again")]
+    certain = bool(distances.max() > MISPLACED)
+    return [Remark("refuse" if certain else "look", "landmarks", sentence, "set them again")]
 
 
 def _incomplete(points: Landmarks, middle: Landmarks) -> list[Remark]:
