@@ -392,6 +392,8 @@ def _odd_landmarks(one: _Marked, middle: Landmarks, usual: float, spread: float,
             )
         ]
     names, distances = _distances(one.points, middle)
+    if len(names) < 3:  # too few for an alignment too, which says so
+        return []
     rest = _residual(one.points, middle)
     if rest <= max(2.5 * usual, 0.02):
         return _incomplete(one.points, middle)

@@ -194,6 +194,7 @@ MARKS = {
     ),
     "two at the origin": (lambda m: {**m, "c": [0, 0, 0], "d": [0, 0, 0]}, "'c' and 'd' both at 0, 0, 0"),
     "a name twice": (lambda m: {"o": m["o"], "a": m["a"], "A": m["b"], "c": m["c"]}, "twice"),
+    "others alone": (lambda m: dict(zip("uvwxyz", m.values(), strict=True)), "3 landmarks of the atlas"),
     "two alone": (lambda m: {"o": m["o"], "a": m["a"]}, "3 landmarks of the atlas are needed"),
 }
 
