@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from naisr_model.errors import InputError
+from naisr_model.numerals import read_number
 
 Kind = Literal["continuous", "binary"]
 Values = Mapping[str, float]
@@ -79,16 +80,21 @@ class Covariate:
             InputError: when ``text`` is neither.
         """
         text = text.strip()
-        if self.kind == "binary" and text in self.levels:
-            return (-1.0, 1.0)[self.levels.index(text)]
+        if self.kind == "binary" and (named := self._named(text)):
+            return (-1.0, 1.0)[self.levels.index(named)]
         try:
-            value = float(text)
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
-            expected = " or ".join(self.levels) if self.kind == "binary" else f"a number in {self.unit}"
-            raise InputError(f"covariate '{self.name}' is '{text}'; expected {expected}")
-        return value
+            return read_number(text)
+        except ValueError as error:
+            expected = f"a number in {self.unit}" if self.unit else "a number"
+            if self.kind == "binary":
+                expected = " or ".join(self.levels)
+            doubt = str(error) if str(error).startswith(", which may be") else f"; expected {expected}"
+            raise InputError(f"covariate '{self.name}' is '{text}'{doubt}") from error
+
+    def _named(self, text: str) -> str:
+        """The level that is meant, in small letters or large ones; empty for none."""
+        folded = [level for level in self.levels if level.casefold() == text.casefold()]
+        return text if text in self.levels else folded[0] if len(folded) == 1 else ""
 
     def format(self, value: float) -> str:
         """The value as people write it, with its unit: ``120 months``, ``M``, ``between F and M``."""

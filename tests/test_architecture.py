@@ -26,6 +26,7 @@ FLOORS = {
             "covariates",
             "frames",
             "config",
+            "numerals",
             "progress",
             "capabilities",
         ),

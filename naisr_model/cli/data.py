@@ -9,6 +9,8 @@ from cyclopts import Parameter
 
 from naisr_model.cli.console import bar
 from naisr_model.data.populations import POPULATIONS, population
+from naisr_model.data.remarks import gravest_first
+from naisr_model.errors import InputError
 
 PopulationName = Annotated[str, Parameter(help=f"{' or '.join(POPULATIONS)}.")]
 
@@ -31,7 +33,8 @@ def populate(name: PopulationName, out: Path, *, patients: int | None = None, se
 def prepare(
     table: Path,
     *,
-    out: Path,
+    out: Path | None = None,
+    check: bool = False,
     surface_samples: int = 100_000,
     near_samples: int = 400_000,
     uniform_samples: int = 100_000,
@@ -41,13 +44,14 @@ def prepare(
 ) -> None:
     """Turn a CSV of meshes and covariates into a store of samples to train on.
 
-    A run that was stopped goes on where it was. Meshes that cannot be used are listed with the
-    reason and left out.
+    A run that was stopped goes on where it was. What was understood of the table is told first. Meshes
+    that cannot be used are listed with the reason and left out.
 
     Args:
-        table: CSV with the columns mesh, subject, visit, then covariates; a TOML file of the same
+        table: CSV or .xlsx with the columns mesh, subject, visit, then covariates; a TOML file of the same
             name beside it may set units, kinds and the alignment.
         out: folder of the store.
+        check: only say what is understood of the table and which files are missing; nothing is written.
         surface_samples: points with normals on each surface.
         near_samples: signed distances close to each surface.
         uniform_samples: signed distances anywhere in the box.
@@ -57,15 +61,23 @@ def prepare(
     """
     from naisr_model.data.prepare import PrepareOptions
     from naisr_model.data.prepare import prepare as run
+    from naisr_model.data.tables import missing_files, read_table
 
+    if out is None and not check:
+        raise InputError("give the folder of the store, --out FOLDER, or --check to look at the table alone")
+    read = read_table(table)
+    for line in (*read.summary, *(f"{one.severity}: {one.text}" for one in gravest_first(read.remarks))):
+        print(line, flush=True)
+    if check or out is None:
+        for sentence in missing_files(read):
+            print(f"missing {sentence}")
+        return
     options = PrepareOptions(surface_samples, near_samples, uniform_samples, held_out, seed, workers)
     with bar("preparing") as progress:
         report = run(table, out, options=options, progress=progress)
-    for remark in report.rejected:
-        print(f"rejected {remark}")
-    for remark in report.warnings:
-        print(f"warning {remark}")
+    for line in report.lines:
+        print(line)
     print(
         f"{len(report.accepted)} shapes in {out} ({len(report.skipped)} were there already), "
-        f"{len(report.rejected)} rejected"
+        f"{len({remark.row for remark in report.rejected})} rejected"
     )

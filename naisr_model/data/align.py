@@ -6,7 +6,6 @@ and rotates about it; ``icp`` moves the surface onto reference points.
 
 from __future__ import annotations
 
-import csv
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -20,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
+from naisr_model.data.markups import Space, read_markups
 from naisr_model.data.meshes import rim
 from naisr_model.errors import InputError
 from naisr_model.progress import SILENT, Progress
@@ -87,25 +87,22 @@ def _point(values: Sequence[float] | NDArray[np.float64]) -> tuple[float, float,
     return x, y, z
 
 
-def read_landmarks(path: str | Path) -> dict[str, tuple[float, float, float]]:
-    """Read a CSV with the columns ``name,x,y,z``, millimetres in the frame of the mesh.
+def read_landmarks(path: str | Path, space: Space = "LPS") -> dict[str, tuple[float, float, float]]:
+    """Read landmarks in millimetres in the frame of a mesh.
+
+    Args:
+        path: a CSV with the columns ``name,x,y,z`` in the frame of the mesh, or a ``.fcsv`` or ``.mrk.json``
+            of 3D Slicer, which states whether it is in LPS or RAS.
+        space: that of the mesh, into which the latter are turned.
 
     Raises:
-        InputError: when the file is missing, a column is missing or a coordinate is not a number.
+        InputError: when the file or a column is missing, a name or a place is there twice, or a coordinate is
+            no number or beyond any scanner.
     """
     path = Path(path)
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = list(csv.DictReader(file))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"landmarks {path} cannot be read ({error}); correct the path") from error
-    try:
-        landmarks = {row["name"].strip(): _point([float(row[axis]) for axis in "xyz"]) for row in rows}
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(f"landmarks {path.name} must have the columns name,x,y,z with numbers") from error
-    if not np.isfinite(list(landmarks.values())).all():
-        raise InputError(f"landmarks {path.name} has a coordinate that is not a finite number")
-    return landmarks
+    if not path.is_file():
+        raise InputError(f"landmarks {path} cannot be read (there is no such file); correct the path")
+    return read_markups(path, space)
 
 
 def landmark_alignment(training: Sequence[Landmarks], origin: str = "") -> Alignment:

@@ -6,7 +6,8 @@ what is left.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterator, Mapping
+import contextlib
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -16,10 +17,11 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike, NDArray
 
-from naisr_model.data import formats, meshes, volumes
+from naisr_model.data import formats, meshes, sheets, volumes
 from naisr_model.data.remarks import Remark, gravest_first
 from naisr_model.errors import InputError
 from naisr_model.frames import BOX_MARGIN, Frame
+from naisr_model.numerals import decimal_marks, read_number
 
 POINT_ENDINGS = {".csv", ".txt", ".xyz"}
 """Text files of points that :func:`read_patient` knows, beside the meshes and the label volumes."""
@@ -136,7 +138,7 @@ def _from_labels(path: Path, label: int | str | None) -> PatientShape:
 def read_points(path: str | Path) -> NDArray[np.float64]:
     """Read a text file of points: three columns, or a header that names x, y and z among others.
 
-    Columns are parted by commas, semicolons, tabs or spaces; lines that begin with # are skipped.
+    Any text that :mod:`naisr_model.data.sheets` reads; lines that begin with # are skipped.
 
     Returns:
         Coordinates as in the file, ``[n, 3]``.
@@ -145,33 +147,49 @@ def read_points(path: str | Path) -> NDArray[np.float64]:
         InputError: when the file is missing, is no such text or has a coordinate that is not finite.
     """
     path = Path(path)
-    content = formats.plain(formats.content_of(path))
-    if what := formats.foreign(content):
-        raise InputError(f"{path.name} is {what[0]}; {what[1]}")
     try:
-        text = content.decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path.name} is no text ({error}); give a text file of points") from error
-    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
+        lines, _ = sheets.read_lines(path, comment="#")
+    except InputError as error:
+        raise InputError(f"{path.name} cannot be read as points: {error}") from error
     if not lines:
         raise InputError(f"{path.name} is empty; give a line x,y,z for each point")
-    separator = next((mark for mark in ",;\t" if mark in lines[0]), None)
-    columns = _columns(path, [part.strip() for part in lines[0].split(separator)])
+    columns = _columns(path, lines[0].cells)
     body = lines[1:] if columns else lines
-    try:
-        points = np.loadtxt(body, delimiter=separator, usecols=columns or (0, 1, 2), ndmin=2)
-    except ValueError as error:
-        raise InputError(f"{path.name} has a line without three numbers ({error}); correct it") from error
+    wide = columns or (0, 1, 2)
+    for line in body:
+        if len(line.cells) <= max(wide):
+            raise InputError(f"{path.name} row {line.number} is a line without three numbers; correct it")
+    cells = [[line.cells[column] for column in wide] for line in body]
+    points = _coordinates(path, cells, [line.number for line in body])
     if not len(points) or not np.isfinite(points).all():
         raise InputError(f"{path.name} has no points or some that are not finite numbers; export it again")
-    return np.asarray(points, np.float64)
+    return points
 
 
-def _columns(path: Path, first: list[str]) -> tuple[int, ...]:
+def _coordinates(path: Path, cells: list[list[str]], numbers: list[int]) -> NDArray[np.float64]:
+    """Numbers of any spelling; at once where they are spelled as usual, since clouds are long."""
+    flat = [cell for row in cells for cell in row]
+    if not any("," in cell or "_" in cell for cell in flat):
+        with contextlib.suppress(ValueError):
+            return np.array(flat, dtype=np.str_).astype(np.float64).reshape(-1, 3)
+    marks = decimal_marks(flat)
+    points = np.zeros((len(cells), 3))
+    for i, row in enumerate(cells):
+        for j, cell in enumerate(row):
+            try:
+                points[i, j] = read_number(cell, marks)
+            except ValueError as error:
+                raise InputError(
+                    f"{path.name} row {numbers[i]} is a line without three numbers: '{cell}'{error}"
+                ) from error
+    return points
+
+
+def _columns(path: Path, first: Sequence[str]) -> tuple[int, ...]:
     """Where x, y and z stand if the first line is a header; empty if it is numbers."""
     if all(_is_number(part) for part in first[:3]):
         return ()
-    names = [part.strip('"').lower() for part in first]
+    names = [sheets.split_title(part)[0].lower() for part in first]
     if not {"x", "y", "z"} <= set(names):
         raise InputError(f"{path.name} has no columns x, y and z in '{','.join(first)[:60]}'; name them so")
     return tuple(names.index(axis) for axis in "xyz")
@@ -179,9 +197,9 @@ def _columns(path: Path, first: list[str]) -> tuple[int, ...]:
 
 def _is_number(text: str) -> bool:
     try:
-        float(text)
-    except ValueError:
-        return False
+        read_number(text, ",.")
+    except ValueError as error:
+        return "may be" in str(error)
     return True
 
 

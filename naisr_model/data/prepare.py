@@ -11,25 +11,35 @@ import hashlib
 import json
 import re
 import shutil
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from naisr_model.data import align, samples, store, tables
+from naisr_model.data import align, meshes, samples, store, tables
 from naisr_model.data.align import Alignment
+from naisr_model.data.comparison import (
+    centred,
+    compared_landmarks,
+    compared_places,
+    compared_shapes,
+    compared_with_people,
+    joined,
+)
+from naisr_model.data.remarks import Remark, gravest_first
+from naisr_model.data.report import PreparationReport, RowRemark, rejected
 from naisr_model.data.split import held_out_mask
-from naisr_model.data.stages import Look, Placed, Sampling, inspect, load, place, write_samples
+from naisr_model.data.stages import Look, Placed, Sampling, inspect, place, write_samples
 from naisr_model.data.tables import ShapeTable, TableRow
 from naisr_model.errors import InputError
 from naisr_model.files import replacing
 from naisr_model.frames import Frame, enclosing_frame
 from naisr_model.progress import SILENT, Progress
-from naisr_model.work.run import in_order, processes
+from naisr_model.work.run import Run, in_order, processes
 
 REPORT = "report.json"
 _OWN_NAME = re.compile(r"[0-9a-f]{24}|\.[0-9a-f]{24}\.\d+\.tmp")
@@ -56,41 +66,6 @@ class PrepareOptions:
     workers: int | None = None
 
 
-class Remark(NamedTuple):
-    """Something about one row of the table: its line (the header is 1), its mesh, and what."""
-
-    row: int
-    path: str
-    reason: str
-
-    def __str__(self) -> str:
-        return f"{self.path} (row {self.row}): {self.reason}"
-
-
-@dataclass(frozen=True)
-class PreparationReport:
-    """What became of each row of the table; rows by line number, the header being 1.
-
-    Attributes:
-        accepted: rows that are in the store.
-        skipped: those of them whose samples an earlier run had already written.
-        rejected: rows that could not be used, with the reason.
-        warnings: rows that were used although something is odd.
-    """
-
-    accepted: tuple[int, ...]
-    skipped: tuple[int, ...]
-    rejected: tuple[Remark, ...]
-    warnings: tuple[Remark, ...]
-
-    def to_json(self) -> dict[str, Any]:
-        """A plain dictionary for ``report.json``."""
-        record = asdict(self)
-        for key in ("rejected", "warnings"):
-            record[key] = [remark._asdict() for remark in getattr(self, key)]
-        return record
-
-
 def prepare(
     csv: str | Path,
     out: str | Path,
@@ -107,7 +82,7 @@ def prepare(
         progress: told the finished share; where it cancels, a later call goes on.
 
     Returns:
-        Which rows were used; also written to ``report.json`` in the store.
+        Which rows were used, and what there is to look at; also written to ``report.json`` in the store.
 
     Raises:
         InputError: when the table, the options or ``out`` cannot be used, or no mesh can; with a note for
@@ -120,12 +95,9 @@ def prepare(
         _make_folder(out / store.SHAPES)
         held_out = held_out_mask([row.subject for row in table.rows], options.held_out, options.seed)
         looks = [(row, table.alignment.method) for row in table.rows]
-        inputs = in_order(run(inspect, looks, progress.part(0.0, 0.05)))
-        with _telling_rejected(table, inputs):
-            alignment = _reference(table, inputs, held_out)
-        places = [(alignment, row.mesh, item) for row, item in zip(table.rows, inputs, strict=True)]
-        placed = in_order(run(place, places, progress.part(0.05, 0.1)))
-        with _telling_rejected(table, placed):
+        inputs = _beside_each_other(table, in_order(run(inspect, looks, progress.part(0.0, 0.05))))
+        alignment, placed = _aligned(table, inputs, held_out, run, progress.part(0.05, 0.1))
+        with _telling_rejected(table, [item.remarks for item in placed]):
             usable = _usable(table, placed)
             population = tables.population_from_table(table.take(usable), held_out[usable])
             frame = _common_frame([placed[i] for i in usable])
@@ -177,39 +149,106 @@ def _report(
     return PreparationReport(
         accepted=tuple(table.rows[i].number for i in written),
         skipped=tuple(table.rows[i].number for i, new in written.items() if not new),
-        rejected=_remarks(table, [item.reason for item in placed]),
-        warnings=_remarks(
-            table, ["; ".join(look.warnings) if i in written else "" for i, look in enumerate(inputs)]
+        rejected=_on_rows(table, [_refusals(item.remarks) for item in placed]),
+        warnings=_on_rows(
+            table, [gravest_first(item.remarks) if i in written else () for i, item in enumerate(placed)]
         ),
+        understood=table.told,
+        table=(*table.remarks, *compared_with_people([look.bulk for look in inputs])),
     )
 
 
-def _remarks(table: ShapeTable, reasons: Sequence[str]) -> tuple[Remark, ...]:
-    """On the rows that have a reason."""
-    rows = zip(table.rows, reasons, strict=True)
-    return tuple(Remark(row.number, str(row.mesh), reason) for row, reason in rows if reason)
+def _on_rows(table: ShapeTable, remarks: Sequence[Sequence[Remark]]) -> tuple[RowRemark, ...]:
+    rows = zip(table.rows, remarks, strict=True)
+    return tuple(RowRemark(row.number, str(row.mesh), one) for row, found in rows for one in found)
+
+
+def _refusals(remarks: Sequence[Remark]) -> list[Remark]:
+    return [remark for remark in remarks if remark.severity == "refuse"]
+
+
+def _refused(remarks: Sequence[Remark]) -> bool:
+    return bool(_refusals(remarks))
 
 
 @contextmanager
-def _telling_rejected(table: ShapeTable, items: Sequence[Look | Placed]) -> Iterator[None]:
+def _telling_rejected(table: ShapeTable, remarks: Sequence[Sequence[Remark]]) -> Iterator[None]:
     """An error that follows from what is left of the table has a note for each row that is not."""
     try:
         yield
     except InputError as error:
-        for remark in _remarks(table, [item.reason for item in items]):
-            error.add_note(f"rejected {remark}")
+        for remark in _on_rows(table, [_refusals(found) for found in remarks]):
+            error.add_note(rejected(remark))
         raise
 
 
 # --- what lies between the stages ---------------------------------------------------------------
 
 
-def _usable(table: ShapeTable, placed: Sequence[Placed]) -> list[int]:
-    if usable := [i for i, item in enumerate(placed) if not item.reason]:
-        return usable
-    raise InputError(
-        f"none of the {len(placed)} meshes can be used; row {table.rows[0].number}: {placed[0].reason}"
+def _beside_each_other(table: ShapeTable, looks: Sequence[Look]) -> list[Look]:
+    """The looks with what only a comparison of rows shows, and landmarks named alike."""
+    looks = [look._replace(landmarks=marks) for look, marks in zip(looks, _named_alike(looks), strict=True)]
+    bulks = [look.bulk for look in looks]
+    shapes = compared_shapes(table.rows, bulks, [look.space for look in looks], table.values)
+    sound = [
+        look.landmarks if not _refused(found) else None for look, found in zip(looks, shapes, strict=True)
+    ]
+    marks = compared_landmarks(sound, bulks)
+    # One that lies the other way round would become what all are moved onto, or stay as it is.
+    turned = compared_places(
+        bulks, [centred(bulk) for bulk in bulks] if table.alignment.method == "icp" else []
     )
+    said = [(*look.remarks, *found) for look, found in zip(looks, joined(shapes, marks, turned), strict=True)]
+    return [look._replace(remarks=remarks) for look, remarks in zip(looks, said, strict=True)]
+
+
+def _named_alike(looks: Sequence[Look]) -> list[align.Landmarks | None]:
+    """Landmarks that differ by case alone under the name that most rows have."""
+    counts = Counter(name for look in looks for name in look.landmarks or ())
+    names: dict[str, str] = {}
+    for name, _ in counts.most_common():
+        names.setdefault(name.casefold(), name)
+    return [
+        look.landmarks and {names[name.casefold()]: point for name, point in look.landmarks.items()}
+        for look in looks
+    ]
+
+
+def _aligned(
+    table: ShapeTable, looks: Sequence[Look], held_out: NDArray[np.bool_], run: Run, progress: Progress
+) -> tuple[Alignment, list[Placed]]:
+    """The reference and every row in its frame; again without what turns out to lie wrong in it."""
+    while True:
+        with _telling_rejected(table, [look.remarks for look in looks]):
+            alignment = _reference(table, looks, held_out)
+        whole = [i for i, look in enumerate(looks) if not _refused(look.remarks)]
+        places = [(alignment, table.rows[i].mesh, looks[i].landmarks) for i in whole]
+        found = in_order(run(place, places, progress))
+        placed = _in_one_frame(looks, dict(zip(whole, found, strict=True)))
+        wrong = [i for i in whole if _refused(placed[i].remarks)]
+        if alignment.method == "none" or held_out[wrong].all():
+            return alignment, placed
+        looks = [
+            look._replace(remarks=placed[i].remarks) if i in wrong else look for i, look in enumerate(looks)
+        ]
+
+
+def _in_one_frame(looks: Sequence[Look], found: Mapping[int, Placed]) -> list[Placed]:
+    """Every row with all that was said of it, its place in the frame compared with the others'."""
+    placed = [found.get(i, Placed(())) for i in range(len(looks))]
+    transforms = [np.array(item.transform) if item.transform else None for item in placed]
+    said = compared_places([look.bulk for look in looks], transforms)
+    return [
+        item._replace(remarks=(*look.remarks, *item.remarks, *remarks))
+        for look, item, remarks in zip(looks, placed, said, strict=True)
+    ]
+
+
+def _usable(table: ShapeTable, placed: Sequence[Placed]) -> list[int]:
+    if usable := [i for i, item in enumerate(placed) if not _refused(item.remarks)]:
+        return usable
+    first = _refusals(placed[0].remarks)[0].text
+    raise InputError(f"none of the {len(placed)} meshes can be used; row {table.rows[0].number}: {first}")
 
 
 def _common_frame(placed: Sequence[Placed]) -> Frame:
@@ -221,21 +260,31 @@ def _reference(table: ShapeTable, inputs: Sequence[Look], held_out: NDArray[np.b
     """Complete the table's alignment with a reference made from usable training rows."""
     if table.alignment.method == "none":
         return table.alignment
-    usable = [i for i, item in enumerate(inputs) if not item.reason and not held_out[i]]
+    usable = [i for i, item in enumerate(inputs) if not _refused(item.remarks) and not held_out[i]]
     if not usable:
-        reasons = [item.reason for item in inputs if item.reason]
+        reasons = [refusal.text for item in inputs for refusal in _refusals(item.remarks)]
         raise InputError(
             f"no training mesh can be used; the first reason: {(reasons or ['all held out'])[0]}"
         )
     if table.alignment.method == "landmarks":
-        origin = table.alignment.origin
-        complete = [
-            marks for i in usable if (marks := inputs[i].landmarks) and (not origin or origin in marks)
-        ]
-        return align.landmark_alignment(complete, origin)
+        return _landmark_reference(
+            [marks for i in usable if (marks := inputs[i].landmarks)], table.alignment.origin
+        )
     # The shape of median volume is the least extreme one to move the others onto.
-    middle = sorted(usable, key=lambda i: inputs[i].volume_mm3)[len(usable) // 2]
-    return align.icp_alignment(load(table.rows[middle].mesh)[0])
+    volumes_mm3 = {i: bulk.volume_mm3 for i in usable if (bulk := inputs[i].bulk)}
+    middle = sorted(usable, key=lambda i: volumes_mm3[i])[len(usable) // 2]
+    return align.icp_alignment(meshes.sound_mesh(table.rows[middle].mesh).mesh_mm)
+
+
+def _landmark_reference(sets: Sequence[align.Landmarks], origin: str) -> Alignment:
+    """Made from the rows that have whatever landmarks most rows have."""
+    names = {name.casefold(): name for marks in sets for name in marks}
+    origin = names.get(origin.casefold(), origin)
+    counts = Counter(name for marks in sets for name in marks)
+    usual = {name for name, count in counts.items() if 2 * count > len(sets)}
+    complete = [marks for marks in sets if usual <= set(marks)]
+    with_origin = [marks for marks in complete or sets if not origin or origin in marks]
+    return align.landmark_alignment(with_origin, origin)
 
 
 def _sampling(

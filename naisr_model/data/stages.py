@@ -13,30 +13,31 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from naisr_model.data import align, meshes, samples, store
 from naisr_model.data.align import Alignment
-from naisr_model.data.tables import TableRow
+from naisr_model.data.comparison import Bulk, measured
+from naisr_model.data.remarks import Remark
+from naisr_model.data.tables import TableRow, require_file
 from naisr_model.errors import InputError
 from naisr_model.frames import Frame
 
 
 class Look(NamedTuple):
-    """What the first look at one row gives; ``reason`` is empty for a usable row."""
+    """What the first look at one row gives; one of the remarks refuses a row that cannot be used."""
 
-    reason: str = ""
-    warnings: tuple[str, ...] = ()
+    remarks: tuple[Remark, ...]
     digest: str = ""
-    volume_mm3: float = 0.0
+    space: str = ""
+    bulk: Bulk | None = None
     landmarks: align.Landmarks | None = None
 
 
 class Placed(NamedTuple):
     """One row in the atlas frame: scanner to atlas, and its bounds there in millimetres."""
 
-    reason: str
+    remarks: tuple[Remark, ...]
     transform: tuple[tuple[float, ...], ...] = ()
     bounds_mm: tuple[tuple[float, ...], ...] = ()
 
@@ -52,46 +53,37 @@ class Sampling(NamedTuple):
     target: Path
 
 
-def load(path: Path) -> tuple[trimesh.Trimesh, tuple[str, ...]]:
-    """A mesh with what can be repaired repaired, and what is odd about it.
-
-    Raises:
-        InputError: when it cannot be used.
-    """
-    file = meshes.sound_mesh(path)
-    return file.mesh_mm, tuple(remark.text for remark in file.remarks)
-
-
 def inspect(job: tuple[TableRow, str]) -> Look:
     """The first look at a row, which is aligned by a method."""
     row, method = job
     try:
-        mesh, warnings = load(row.mesh)
+        require_file(row.mesh)
+        file = meshes.sound_mesh(row.mesh)
         landmarks = None
         if method == "landmarks":
             if row.landmarks is None:
                 raise InputError("the row has no landmarks file; alignment by landmarks needs one")
-            landmarks = align.read_landmarks(row.landmarks)
+            require_file(row.landmarks)
+            landmarks = align.read_landmarks(row.landmarks, file.space or "LPS")
         digest = hashlib.sha256(row.mesh.read_bytes()).hexdigest()
+        return Look(file.remarks, digest, file.space, measured(file.mesh_mm), landmarks)
     except InputError as error:
-        return Look(reason=str(error))
+        return Look((Remark("refuse", "file", str(error)),))
     except Exception as error:  # one damaged mesh never stops the others, whatever is wrong with it
-        return Look(reason=f"{row.mesh.name} cannot be used ({error!r}); export it again")
-    return Look("", warnings, digest, float(mesh.volume), landmarks)
+        sentence = f"{row.mesh.name} cannot be used ({error!r})"
+        return Look((Remark("refuse", "file", sentence, "export it again"),))
 
 
-def place(job: tuple[Alignment, Path, Look]) -> Placed:
+def place(job: tuple[Alignment, Path, align.Landmarks | None]) -> Placed:
     """Where the mesh of a row that was looked at lies once it is aligned."""
-    alignment, path, item = job
-    if item.reason:
-        return Placed(item.reason)
+    alignment, path, landmarks = job
     try:
-        mesh, _ = load(path)
-        transform = align.rigid_transform(alignment, mesh, item.landmarks)
+        mesh = meshes.sound_mesh(path).mesh_mm
+        transform = align.rigid_transform(alignment, mesh, landmarks)
     except InputError as error:
-        return Placed(str(error))
+        return Placed((Remark("refuse", "alignment", str(error)),))
     mesh.apply_transform(transform)
-    return Placed("", _nested(transform), _nested(mesh.bounds))
+    return Placed((), _nested(transform), _nested(mesh.bounds))
 
 
 def _nested(array: NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:
@@ -103,7 +95,7 @@ def write_samples(job: Sampling) -> bool:
     if store.is_whole(job.target, dict(zip(store.KINDS, job.counts, strict=True)), job.frame.dim):
         return False
     shutil.rmtree(job.target, ignore_errors=True)
-    mesh, _ = load(job.mesh)
+    mesh = meshes.sound_mesh(job.mesh).mesh_mm
     mesh.apply_transform(np.array(job.transform))
     taken = samples.sample_shape(mesh, job.frame, *job.counts, job.seed)
     temporary = job.target.with_name(f".{job.target.name}.{os.getpid()}.tmp")

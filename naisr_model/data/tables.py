@@ -1,8 +1,9 @@
 """The user's table: one row a mesh, with the subject, the visit and the covariates.
 
 Columns: ``mesh`` (path, relative to the table), ``subject``, optionally ``visit`` (numbered when
-absent) and ``landmarks`` (path of a CSV ``name,x,y,z``); every other column is a covariate. A header
-may carry a unit: ``age [months]`` or ``weight (kg)``. A TOML file with the same stem may add to it::
+absent) and ``landmarks`` (path of a CSV ``name,x,y,z``, or of 3D Slicer's ``.fcsv`` or ``.mrk.json``);
+every other column is a covariate. A header may carry a unit: ``age [months]`` or ``weight (kg)``. Any file
+that :mod:`naisr_model.data.sheets` reads will do. A TOML file with the same stem may add to it::
 
     name = "airway"
     [covariates.sex]
@@ -15,29 +16,34 @@ may carry a unit: ``age [months]`` or ``weight (kg)``. A TOML file with the same
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
-import math
+import os
 import re
 import tomllib
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any
+from pathlib import Path, PureWindowsPath
+from typing import Any, get_args
+from urllib.parse import unquote, urlparse
 
 import numpy as np
 from numpy.typing import NDArray
 
 from naisr_model.covariates import Covariate, Kind, Population
 from naisr_model.data.align import METHODS, Alignment
+from naisr_model.data.columns import Column, Fault, Reading, read_column, refuse
+from naisr_model.data.remarks import Remark
+from naisr_model.data.sheets import Sheet, numbered, read_sheet, read_text, split_title
 from naisr_model.errors import InputError
 from naisr_model.files import replacing
+from naisr_model.numerals import IS_MISSING, decimal_marks, is_missing
 
 RESERVED = ("mesh", "subject", "visit", "landmarks")
 _TABLES = ("covariates", "alignment", "source")
 _ALIGNMENT_KEYS = ("method", "origin")
-_HEADER = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>[^)]*)\))?\s*$")
 
 
 @dataclass(frozen=True)
@@ -70,6 +76,8 @@ class ShapeTable:
         values: real units, -1/+1 for binary covariates, ``[n, len(covariates)]``.
         alignment: method and origin; the reference is made later.
         source: the TOML's ``[source]`` table.
+        told: how each covariate was understood, a line each.
+        remarks: what looks wrong in the table, or was set right.
     """
 
     name: str
@@ -78,6 +86,16 @@ class ShapeTable:
     values: NDArray[np.float64]
     alignment: Alignment
     source: dict[str, Any]
+    told: tuple[str, ...]
+    remarks: tuple[Remark, ...]
+
+    @property
+    def summary(self) -> tuple[str, ...]:
+        """What was understood, for people, and where to say otherwise."""
+        subjects = len({row.subject for row in self.rows})
+        counted = f"{self.name}: {len(self.rows)} rows, {subjects} subjects"
+        toml = "unit, kind or levels of a covariate can be set in the TOML beside the table"
+        return (counted, *(f"  {line}" for line in self.told), f"  ({toml})")
 
     def take(self, indices: Sequence[int]) -> ShapeTable:
         """The table with only some of its rows."""
@@ -88,78 +106,76 @@ class ShapeTable:
 def read_table(path: str | Path) -> ShapeTable:
     """Read ``path`` and the TOML beside it.
 
-    The kind of a covariate is guessed where the TOML does not give it: two distinct values make it
-    binary, the first in sorted order being -1. Where there is a ``landmarks`` column, alignment by
-    landmarks is the default.
+    The kind of a covariate is guessed where the TOML does not give it: words, or two distinct numbers
+    without a unit, make it binary, the first in sorted order being -1. Where there is a ``landmarks``
+    column, alignment by landmarks is the default.
 
     Raises:
-        InputError: naming the row and the column, for anything that cannot be used.
+        InputError: naming all rows and columns that cannot be used.
     """
     path = Path(path)
-    header, lines = _read_lines(path)
+    sheet = read_sheet(path)
+    titles = _titles(path, sheet)
     extra = _read_toml(path.with_suffix(".toml"))
-    rows = _rows(path, header, lines)
-    names = [name for name in header if name not in RESERVED]
+    names = [name for name in titles if name not in RESERVED]
     if not names:
         raise InputError(f"{path.name} has no covariate; add a column such as 'age [months]'")
     _known_only(path, extra, names)
-    numbers = [row.number for row in rows]
-    columns = [
-        _column(path, name, header[name], extra.get("covariates", {}).get(name, {}), numbers, lines)
-        for name in names
-    ]
+    if len(sheet.lines) == 1:
+        raise InputError(f"{path.name} has one row, of which nothing can be learned; add one row a mesh")
+    rows, faults = _rows(path, sheet, titles)
+    readings = _readings(path, sheet, titles, extra.get("covariates", {}))
+    refuse(path.name, [*faults, *(fault for reading in readings for fault in reading.faults)])
     return ShapeTable(
         name=extra.get("name", path.stem),
         rows=rows,
-        covariates=tuple(covariate for covariate, _ in columns),
-        values=np.stack([values for _, values in columns], axis=1),
-        alignment=_alignment(path, extra.get("alignment", {}), "landmarks" in header),
+        covariates=tuple(reading.covariate for reading in readings),
+        values=np.stack([reading.values for reading in readings], axis=1),
+        alignment=_alignment(path, extra.get("alignment", {}), "landmarks" in titles),
         source=dict(extra.get("source", {})),
+        told=tuple(reading.told for reading in readings),
+        remarks=(
+            *sheet.remarks,
+            *_one_subject(rows),
+            *(remark for reading in readings for remark in reading.remarks),
+        ),
     )
 
 
-def _read_lines(path: Path) -> tuple[dict[str, str], list[dict[str, str]]]:
-    """Units by column name, and one dictionary of cells a line; the key ``""`` holds the line number."""
-    if not path.is_file():
-        raise InputError(f"the table {path} does not exist; correct the path")
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.reader(file)
-            titles = [_split_title(title) for title in next(reader, [])]
-            cells = [(reader.line_num, line) for line in reader if any(cell.strip() for cell in line)]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path.name} cannot be read as a CSV table in UTF-8 ({error})") from error
-    if doubled := [name for name, count in Counter(name for name, _ in titles).items() if count > 1]:
-        raise InputError(f"{path.name} has the column '{doubled[0]}' twice; rename one")
-    names = [name for name, _ in titles]
-    if "" in names:
+def _one_subject(rows: Sequence[TableRow]) -> tuple[Remark, ...]:
+    if len({row.subject for row in rows}) > 1:
+        return ()
+    sentence = "all rows are of one subject, so differences between people cannot be learned"
+    return (Remark("look", "subjects", sentence, "look whether the column 'subject' is right"),)
+
+
+def _titles(path: Path, sheet: Sheet) -> dict[str, tuple[str, str]]:
+    """Title and unit of each column by its name; those that are :data:`RESERVED` in small letters."""
+    named: dict[str, tuple[str, str]] = {}
+    for title in sheet.titles:
+        name, unit = split_title(title)
+        if name.casefold() in RESERVED:
+            name = name.casefold()
+        if same := [other for other in named if other.casefold() == name.casefold()]:
+            alike = f"'{name}' twice" if same[0] == name else f"both '{same[0]}' and '{name}'"
+            raise InputError(f"{path.name} has the column {alike}; rename one")
+        named[name] = title, unit
+    if "" in named:
         raise InputError(f"{path.name} has a column without a name; name it or remove it")
-    if "subject" not in names:
-        raise InputError(f"{path.name} has no column 'subject'; it has {', '.join(names) or 'none'}")
-    if not cells:
+    if "subject" not in named:
+        raise InputError(f"{path.name} has no column 'subject'; it has {', '.join(named) or 'none'}")
+    if not sheet.lines:
         raise InputError(f"{path.name} has a header but no rows; add one row a mesh")
-    for number, line in cells:
-        if len(line) != len(names):
-            raise InputError(f"{path.name} row {number} has {len(line)} cells, the header has {len(names)}")
-    lines = [dict(zip(names, map(str.strip, line), strict=True)) | {"": str(n)} for n, line in cells]
-    return dict(titles), lines
-
-
-def _split_title(title: str) -> tuple[str, str]:
-    """``age [months]`` to ``("age", "months")``."""
-    match = _HEADER.match(title.strip())
-    if match is None:
-        return title.strip(), ""
-    return match["name"], (match["square"] or match["round"] or "").strip()
+    return named
 
 
 def _read_toml(path: Path) -> dict[str, Any]:
     if not path.is_file():
         return {}
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path.name} is not valid TOML ({error})") from error
+        return tomllib.loads(read_text(path)[0])
+    except (RecursionError, ValueError) as error:
+        raise InputError(f"{path.name} is not valid TOML ({error}); correct it") from error
 
 
 def _known_only(path: Path, extra: Mapping[str, Any], names: Sequence[str]) -> None:
@@ -175,11 +191,14 @@ def _known_only(path: Path, extra: Mapping[str, Any], names: Sequence[str]) -> N
     _texts_only(toml, {"name": extra.get("name", "")} | alignment)
     for name, settings in extra.get("covariates", {}).items():
         if name not in names:
-            raise InputError(f"{toml} describes '{name}', which is not a column of {path.name}")
+            has = ", ".join(names)
+            raise InputError(f"{toml} describes '{name}', which is not a column of {path.name}; it has {has}")
         if not isinstance(settings, dict) or set(settings) - {"unit", "kind", "levels"}:
             raise InputError(f"[covariates.{name}] in {toml} may have unit, kind and levels only")
         _texts_only(toml, {key: value for key, value in settings.items() if key != "levels"})
         _check_levels(toml, name, settings.get("levels", []))
+        if (kind := settings.get("kind", "binary")) not in get_args(Kind):
+            raise InputError(f"'{name}' has the kind '{kind}' in {toml}; use continuous or binary")
     for key, value in extra.get("source", {}).items():
         if not isinstance(value, str | int | float):  # it is kept as JSON, which has no dates
             raise InputError(f"'{key}' of [source] in {toml} is {value}; give text or a number")
@@ -198,60 +217,106 @@ def _check_levels(toml: str, name: str, levels: Any) -> None:
         )
 
 
-def _rows(path: Path, header: Mapping[str, str], lines: Sequence[Mapping[str, str]]) -> tuple[TableRow, ...]:
+def _rows(
+    path: Path, sheet: Sheet, titles: Mapping[str, tuple[str, str]]
+) -> tuple[tuple[TableRow, ...], list[Fault]]:
+    """What each row is about; every cell that must hold something and does not."""
     seen: Counter[str] = Counter()
     rows: list[TableRow] = []
-    for line in lines:
-        for name in RESERVED:
-            if name in header and not line[name] and name != "landmarks":
-                raise InputError(f"{path.name} row {line['']}, column '{name}' is empty; fill it in")
-        subject = line["subject"]
-        seen[subject] += 1
+    faults: list[Fault] = []
+    own = {name: sheet.column(titles[name][0]) for name in RESERVED if name in titles}
+    for i, line in enumerate(sheet.lines):
+        cells = {name: column[i] for name, column in own.items()}
+        needed = [name for name in cells if name != "landmarks"]
+        faults += [Fault(line.number, n, cells[n], IS_MISSING) for n in needed if is_missing(cells[n])]
+        seen[cells["subject"]] += 1
+        marks = cells.get("landmarks", "")
         rows.append(
             TableRow(
-                number=int(line[""]),
-                mesh=path.parent / line.get("mesh", ""),
-                subject=subject,
-                visit=line.get("visit", str(seen[subject])),
-                landmarks=path.parent / line["landmarks"] if line.get("landmarks") else None,
+                number=line.number,
+                mesh=_located(path.parent, cells.get("mesh", "")),
+                subject=cells["subject"],
+                visit=cells.get("visit", str(seen[cells["subject"]])),
+                landmarks=None if is_missing(marks) else _located(path.parent, marks),
             )
         )
-    first: dict[tuple[str, str], int] = {}
+    if not faults:
+        _refuse_repeated(path, rows)
+    return tuple(rows), faults
+
+
+def _refuse_repeated(path: Path, rows: Sequence[TableRow]) -> None:
+    found: dict[tuple[str, str], list[int]] = {}
     for row in rows:
-        if (earlier := first.setdefault((row.subject, row.visit), row.number)) != row.number:
-            raise InputError(
-                f"{path.name} rows {earlier} and {row.number} are both visit '{row.visit}' of subject "
-                f"'{row.subject}'; give each visit its own name"
-            )
-    return tuple(rows)
+        found.setdefault((row.subject, row.visit), []).append(row.number)
+    repeated = {key: numbers for key, numbers in found.items() if len(numbers) > 1}
+    if not repeated:
+        return
+    (subject, visit), numbers = next(iter(repeated.items()))
+    more = f", and {len(repeated) - 1} more visits are there again" if len(repeated) > 1 else ""
+    raise InputError(
+        f"{path.name} {numbered(numbers)} are {'both' if len(numbers) == 2 else 'all'} visit '{visit}' of "
+        f"subject '{subject}'{more}; give each visit its own name"
+    )
 
 
-def _column(
-    path: Path,
-    name: str,
-    header_unit: str,
-    settings: Mapping[str, Any],
-    numbers: Sequence[int],
-    lines: Sequence[Mapping[str, str]],
-) -> tuple[Covariate, NDArray[np.float64]]:
-    """Read one covariate; centre and scale are set later, from the training rows."""
-    cells = [line[name] for line in lines]
-    for number, cell in zip(numbers, cells, strict=True):
-        if not cell:
-            raise InputError(
-                f"{path.name} row {number}, column '{name}' is empty; fill it in or drop the row"
-            )
-    unit = _unit(path, name, header_unit, settings)
-    levels = _levels(path, name, settings, cells)
-    if levels is None:
-        values = np.array([_number(path, number, name, c) for number, c in zip(numbers, cells, strict=True)])
-    else:
-        values = np.array([_level(path, n, name, c, levels) for n, c in zip(numbers, cells, strict=True)])
-    kind: Kind = "continuous" if levels is None else "binary"
-    observed = (float(values.min()), float(values.max()))
-    if observed[0] == observed[1]:
-        raise InputError(f"column '{name}' of {path.name} is {cells[0]} in every row; remove the column")
-    return Covariate(name, unit, kind, 0.0, 1.0, observed, levels or ("-1", "+1")), values
+def _located(folder: Path, text: str) -> Path:
+    """The file that a cell names, also by ``~/``, by a ``file://`` address or with backslashes."""
+    if text.lower().startswith("file:"):
+        text = unquote(urlparse(text).path)
+    written = folder / (os.path.expanduser(text) if text.startswith(("~/", "~\\")) else text)
+    if "\\" not in text or os.path.exists(written):
+        return written
+    return _located(folder, PureWindowsPath(text).as_posix())
+
+
+def require_file(path: Path) -> None:
+    """Make sure that a file that the table names is there.
+
+    Raises:
+        InputError: with what is there instead.
+    """
+    if os.path.exists(path):
+        return
+    text = str(path)
+    if re.search(r"(^|/)[A-Za-z]:/", text.replace("\\", "/")) and os.sep == "/":
+        raise InputError(f"{path} does not exist; it is a path of Windows, write it relative to the table")
+    if re.search(r"\b(https?|s3|ftp):/", text):
+        raise InputError(f"{path} does not exist; it is an address, copy the file beside the table")
+    names: list[str] = []
+    with contextlib.suppress(OSError):
+        names = os.listdir(path.parent)
+    if alike := [name for name in names if name.casefold() == path.name.casefold()]:
+        raise InputError(f"{path} does not exist; there is '{alike[0]}', so spell it alike")
+    raise InputError(f"{path} does not exist; correct the path")
+
+
+def missing_files(table: ShapeTable) -> tuple[str, ...]:
+    """A sentence for each file that the table names and that is not there."""
+    found = []
+    for row in table.rows:
+        for path in (row.mesh, row.landmarks):
+            try:
+                if path is not None:
+                    require_file(path)
+            except InputError as error:
+                found.append(f"row {row.number}: {error}")
+    return tuple(found)
+
+
+def _readings(
+    path: Path, sheet: Sheet, titles: Mapping[str, tuple[str, str]], settings: Mapping[str, Any]
+) -> list[Reading]:
+    """Every covariate as it is understood."""
+    numbers = tuple(line.number for line in sheet.lines)
+    columns = [
+        Column(name, _unit(path, name, unit, own), own, numbers, sheet.column(title))
+        for name, (title, unit) in titles.items()
+        if name not in RESERVED
+        for own in (settings.get(name, {}),)
+    ]
+    marks = decimal_marks(cell for column in columns for cell in column.cells)
+    return [read_column(column, marks) for column in columns]
 
 
 def _unit(path: Path, name: str, header_unit: str, settings: Mapping[str, Any]) -> str:
@@ -262,52 +327,6 @@ def _unit(path: Path, name: str, header_unit: str, settings: Mapping[str, Any]) 
             f"make them agree"
         )
     return unit
-
-
-def _levels(
-    path: Path, name: str, settings: Mapping[str, Any], cells: Sequence[str]
-) -> tuple[str, str] | None:
-    """The names of -1 and +1, or None for a continuous covariate."""
-    distinct = sorted(set(cells), key=lambda cell: (_as_number(cell), cell))
-    numeric = [cell for cell in distinct if not math.isnan(_as_number(cell))]
-    kind = settings.get("kind", "binary" if "levels" in settings else _guess(distinct, numeric))
-    if kind == "continuous":
-        return None
-    if kind != "binary":
-        raise InputError(f"'{name}' has the kind '{kind}' in {path.stem}.toml; use continuous or binary")
-    levels = tuple(map(str, settings.get("levels", distinct)))
-    if len(levels) != 2 or len(set(levels)) != 2:
-        shown = ", ".join(levels[:4]) + (", ..." if len(levels) > 4 else "")
-        raise InputError(f"binary covariate '{name}' must have two values; it has {len(levels)}: {shown}")
-    return levels[0], levels[1]
-
-
-def _guess(distinct: Sequence[str], numeric: Sequence[str]) -> str:
-    if not numeric:  # all text: two categories, or a mistake that the caller reports
-        return "binary"
-    return "binary" if len(numeric) == len(distinct) == 2 else "continuous"
-
-
-def _as_number(cell: str) -> float:
-    try:
-        return float(cell)
-    except ValueError:
-        return math.nan
-
-
-def _number(path: Path, number: int, name: str, cell: str) -> float:
-    value = _as_number(cell)
-    if not math.isfinite(value):
-        raise InputError(f"{path.name} row {number}, column '{name}' is '{cell}'; expected a number")
-    return value
-
-
-def _level(path: Path, number: int, name: str, cell: str, levels: tuple[str, str]) -> float:
-    if cell not in levels:
-        raise InputError(
-            f"{path.name} row {number}, column '{name}' is '{cell}'; expected {levels[0]} or {levels[1]}"
-        )
-    return (-1.0, 1.0)[levels.index(cell)]
 
 
 def _alignment(path: Path, settings: Mapping[str, Any], has_landmarks: bool) -> Alignment:

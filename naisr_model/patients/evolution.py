@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import dataclasses
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from naisr_model.atlas import Atlas, Fit, Individual
 from naisr_model.covariates import complete, growth_path, require_known
+from naisr_model.data.sheets import read_sheet, split_title
 from naisr_model.errors import InputError
 
 
@@ -103,10 +103,10 @@ def along_table(fit: Fit, path: Path) -> list[Individual]:
         InputError: when the file cannot be read, has no row, or holds what is no covariate value.
     """
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = list(csv.DictReader(file))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"the path {path} cannot be read ({error}); correct it") from error
+        records = read_sheet(path).records()
+    except InputError as error:
+        raise InputError(f"the path {path} cannot be read: {error}") from error
+    rows = [{split_title(title)[0]: cell for title, cell in record.items()} for record in records]
     if not rows:
         raise InputError(f"the path {path} has no rows; give a header of covariates and a row for each step")
     return [fit.at(parsed(fit.individual.atlas, row)) for row in rows]

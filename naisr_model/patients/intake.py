@@ -19,6 +19,7 @@ from naisr_model.atlas import Atlas
 from naisr_model.covariates import Values
 from naisr_model.data import volumes
 from naisr_model.data.align import Landmarks, Method, Proposal, propose, read_landmarks
+from naisr_model.data.markups import Space
 from naisr_model.data.patients import (
     PatientShape,
     check_patient,
@@ -108,7 +109,7 @@ def take_in(
         label: which label of a volume, its number or its name.
         scale: millimetres per unit of the file; left out, it is guessed where the size is implausible.
         align: ``none``, ``icp`` or ``landmarks``.
-        landmarks: a CSV name,x,y,z in the coordinates of the file; for ``landmarks``.
+        landmarks: a CSV name,x,y,z in the coordinates of the file, or one of 3D Slicer; for ``landmarks``.
         progress: told the share of the alignment: the atlas's shape is made, the motion is sought.
 
     Raises:
@@ -169,14 +170,14 @@ def aligned(
         atlas: whose shape counts.
         known: covariates in real units; the patient is aligned to the atlas's shape at them.
         method: ``icp``, ``landmarks``, or ``none`` to leave everything as it is.
-        landmarks: a CSV name,x,y,z in the coordinates of the file; for ``landmarks``.
+        landmarks: a CSV name,x,y,z in the coordinates of the file, or one of 3D Slicer; for ``landmarks``.
         progress: told the share of the alignment: the atlas's shape is made, the motion is sought.
 
     Raises:
         InputError: when landmarks are missing or too few, no shape is there to align to, or the unit is open.
         Cancelled: when nobody waits any more.
     """
-    points = _landmarks(method, landmarks)
+    points = _landmarks(method, landmarks, intake.patient.space or "LPS")
     if method == "none":
         return intake
     _refuse(intake.patient.source, (remark for remark in intake.found if remark.topic == "units"))
@@ -185,13 +186,13 @@ def aligned(
     return Intake(patient, check_patient(patient, atlas.frame), method, proposal)
 
 
-def _landmarks(align: Method, path: Path | None) -> Landmarks:
+def _landmarks(align: Method, path: Path | None, space: Space) -> Landmarks:
     if (align == "landmarks") != (path is not None):
         raise InputError(
             "alignment by landmarks and a file of them (--align landmarks, --landmarks FILE.csv) need each "
             "other; give both or neither"
         )
-    return {} if path is None else read_landmarks(path)
+    return {} if path is None else read_landmarks(path, space)
 
 
 def _in_units(patient: PatientShape, scale: float | None) -> PatientShape:

@@ -11,7 +11,7 @@ from PySide6.QtTest import QTest
 
 from naisr_model.errors import InputError
 from naisr_viewer.control.controller import Controller
-from naisr_viewer.files.exports import planned
+from naisr_viewer.files.exports import STRANGE, planned
 from naisr_viewer.panels.kinds import layouts_of, panels_in
 from naisr_viewer.state.layouts import FULL_SHAPE, Layout
 from naisr_viewer.state.requests import EXACT_RESOLUTION, ExportChoice
@@ -87,10 +87,11 @@ def run_demo(window: MainWindow, controller: Controller, folder: Path) -> None:
     """
     _picture(window, controller, folder / "start.png")
     for name, row in window.covariates.rows.items():
+        plain = STRANGE.sub("-", name).strip("-.")
         drag(row, 0.5, 1.0)
-        _picture(window, controller, folder / f"{name}-high.png")
+        _picture(window, controller, folder / f"{plain}-high.png")
         drag(row, 1.0, 0.0)
-        _picture(window, controller, folder / f"{name}-low.png")
+        _picture(window, controller, folder / f"{plain}-low.png")
         row.reset.click()
         print(f"dragged {name} from {row.reach}", flush=True)
     scan = _export_moved(window, controller, folder)

@@ -234,3 +234,79 @@ def test_landmarks_are_proposed_with_their_residual():
         propose("landmarks", scan, body, Alignment(), named(rng.random((5, 3))))
     with pytest.raises(InputError, match="'cords'"):
         propose("landmarks", scan, body, alignment)
+
+
+FCSV = """# Markups fiducial file version = 4.11
+# CoordinateSystem = {space}
+# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID
+vtkMRMLMarkupsFiducialNode_0,1.5,-2,3,0,0,0,1,1,1,0,cords,,
+vtkMRMLMarkupsFiducialNode_1,4,5,6,0,0,0,1,1,1,0,carina,"a, b",
+"""
+
+
+def markups(space: str, **changes) -> str:
+    points = [
+        {"label": "cords", "position": [1.5, -2, 3], "positionStatus": "defined"},
+        {"label": "carina", "position": [4, 5, 6], "positionStatus": "defined"},
+        {"label": "unset", "position": [0, 0, 0], "positionStatus": "undefined"},
+    ]
+    markup = {"type": "Fiducial", "coordinateSystem": space, "coordinateUnits": "mm", "controlPoints": points}
+    return json.dumps({"markups": [markup | changes]})
+
+
+@pytest.mark.parametrize("name", ["points.fcsv", "points.mrk.json"])
+@pytest.mark.parametrize("space", ["LPS", "RAS"])
+def test_landmarks_of_slicer_come_in_the_space_of_the_mesh(tmp_path, name, space):
+    path = tmp_path / name
+    path.write_text(FCSV.format(space=space) if name.endswith("fcsv") else markups(space))
+    as_written = {"cords": (1.5, -2.0, 3.0), "carina": (4.0, 5.0, 6.0)}
+    turned = {"cords": (-1.5, 2.0, 3.0), "carina": (-4.0, -5.0, 6.0)}
+    for wanted in ("LPS", "RAS"):
+        assert read_landmarks(path, wanted) == (as_written if wanted == space else turned)
+
+
+def test_numbered_spaces_of_old_files_are_known(tmp_path):
+    (tmp_path / "old.fcsv").write_text(FCSV.format(space="0"))
+    assert read_landmarks(tmp_path / "old.fcsv", "RAS")["cords"] == (1.5, -2.0, 3.0)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "name;x;y;z\ncords;1,5;-2;3\ncarina;4;5;6\n",
+        "Label,X [mm],Y [mm],Z [mm],note\ncords,1.5,-2,3,\ncarina,4,5,6,soft\n",
+        "name\tx\ty\tz\ncords\t1.5\t-2\t3\ncarina\t4\t5\t6\n",
+    ],
+)
+def test_tables_of_landmarks_are_read_in_every_dress(tmp_path, text):
+    for encoding in ("utf-8-sig", "utf-16"):
+        (tmp_path / "points.csv").write_bytes(text.encode(encoding))
+        assert read_landmarks(tmp_path / "points.csv") == {
+            "cords": (1.5, -2.0, 3.0),
+            "carina": (4.0, 5.0, 6.0),
+        }
+
+
+BAD_LANDMARKS = {
+    "twice.csv": ("name,x,y,z\na,1,2,3\nA,4,5,6\n", "'a' twice"),
+    "same.csv": ("name,x,y,z\na,1,2,3\nb,1,2,3\n", "'a' and 'b' both at 1, 2, 3"),
+    "far.csv": ("name,x,y,z\na,1,2,3\nb,1e6,2,3\n", "'b' is at 1e+06, 2, 3, beyond any scanner"),
+    "nameless.csv": ("name,x,y,z\n,1,2,3\n", "without a name"),
+    "doubt.csv": ('name,x,y,z\na,"1,234",2,3\n', "which may be 1.234 or 1234"),
+    "image.fcsv": (FCSV.format(space="IJK"), "are in IJK"),
+    "cut.fcsv": (FCSV.format(space="LPS")[:230], "cells only"),
+    "image.mrk.json": (markups("IJK"), "are in IJK"),
+    "feet.mrk.json": (markups("LPS", coordinateUnits="in"), "are in in"),
+    "curve.mrk.json": (json.dumps({"markups": []}), "no file of one list of points"),
+    "half.mrk.json": (markups("LPS")[:100], "no file of one list of points"),
+    "deep.json": ("[" * 100_000, "no file of one list of points"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_LANDMARKS)
+def test_landmarks_that_cannot_be_used_are_explained(tmp_path, name):
+    text, words = BAD_LANDMARKS[name]
+    (tmp_path / name).write_text(text)
+    with pytest.raises(InputError) as caught:
+        read_landmarks(tmp_path / name)
+    assert words in str(caught.value) and name in str(caught.value)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 
 from naisr_model.covariates import Covariate, Population
 from naisr_model.data.split import held_out_mask
-from naisr_model.data.tables import population_from_table, read_table, write_table
+from naisr_model.data.tables import missing_files, population_from_table, read_table, write_table
 from naisr_model.errors import InputError
 
 GOOD = """mesh,subject,visit,age [months],weight (kg),sex,operated
@@ -177,6 +179,166 @@ def test_a_missing_or_foreign_file_is_explained(tmp_path):
     (tmp_path / "data.csv").write_bytes(b"\xff\xfe\x00subject")
     with pytest.raises(InputError, match="UTF-8"):
         read_table(tmp_path / "data.csv")
+
+
+def test_all_cells_that_cannot_be_used_are_told_at_once(tmp_path):
+    rows = ["p1,12 months,F", "p2,n/a,M", "p3,1_000,M", "p4,30,", "p5,31,F", "p6,n/a,X", "p7,NA,F", ",40,M"]
+    with pytest.raises(InputError) as caught:
+        table(tmp_path, "\n".join(["subject,age,sex", *rows]), '[covariates.sex]\nlevels = ["F", "M"]')
+    for words in (
+        "'subject' is empty in row 9",
+        "'12 months' in row 2, a number with a unit; leave the number and write [months]",
+        "'n/a' in rows 3 and 7, 'NA' in row 8, which stands for a missing value",
+        "'1_000' in row 4",
+        "'sex' is empty in row 5",
+        "'X' in row 7; expected F or M",
+    ):
+        assert words in str(caught.value)
+
+
+def test_hundreds_of_bad_cells_make_one_sentence(tmp_path):
+    rows = "".join(f"p{i},{'NA' if i % 2 else i},{i} kg\n" for i in range(400))
+    with pytest.raises(InputError) as caught:
+        table(tmp_path, "subject,age,weight\n" + rows)
+    assert "'NA' in rows 3, 5, 7" in str(caught.value)
+    assert "190 more" in str(caught.value)
+    assert len(str(caught.value)) < 1000
+
+
+LOOKS = {
+    "-99": ("subject,age\na,-99\nb,24\nc,110\nd,57\n", "'age' is -99 in row 2, and otherwise 24 to 110"),
+    "999": ("subject,age\na,24\nb,999\nc,110\nd,999\n", "'age' is 999 in rows 3 and 5, and otherwise 24"),
+    "-9 and 999": ("subject,w\na,-9\nb,999\nc,11\nd,15\ne,12\n", "'w' is -9 in row 2"),
+    "codes": ("subject,grade\na,1\nb,2\nc,9\nd,1\n", "'grade' is 9 in row 4, and otherwise 1 to 2"),
+    "categories": ("subject,type\na,1\nb,2\nc,3\nd,1\n", "only the values 1, 2, 3 and was read as a number"),
+    "two ages": (
+        "subject,age [months]\na,6\nb,24\nc,6.0\n",
+        "only the values 6 and 24 and was read as a number",
+    ),
+    "two numbers": ("subject,age\na,6\nb,24\nc,6.0\n", "only the values 6 and 24 and was read as two levels"),
+    "a slip": ("subject,w\na,12\nb,115\nc,13.5\nd,11\ne,14\n", "'w' is 115 in row 3, far from the others"),
+    "one subject": ("subject,age\na,6\na,24\na,7\n", "all rows are of one subject"),
+}
+
+
+@pytest.mark.parametrize("name", LOOKS)
+def test_what_looks_wrong_is_told(tmp_path, name):
+    text, words = LOOKS[name]
+    assert any(words in one.text for one in table(tmp_path, text).remarks if one.severity == "look")
+
+
+@pytest.mark.parametrize(
+    "column",
+    [
+        "age [months],1,23,55,71,89,111,129,161,179,199,233",
+        "age,0,10,20,30,40,50,60,70,80,90,99",
+        "weight [kg],3.9,14.2,20.1,21.8,19.7,32.85,44.8,21.3,59.0,93.9,75.6",
+        "operated,0,1,1,0,0,1,0,0,0,1,1",
+        "sex,F,M,M,F,F,M,F,F,F,M,M",
+        "z,-1.2,0.3,-1,1.4,0.2,-0.4,0.9,2.2,-2.1,0.4,0.6",
+    ],
+)
+def test_of_usual_columns_nothing_is_told(tmp_path, column):
+    title, *cells = column.split(",")
+    rows = "".join(f"p{i},{cell}\n" for i, cell in enumerate(cells))
+    assert table(tmp_path, f"subject,{title}\n{rows}").remarks == ()
+
+
+def test_the_kind_in_the_toml_answers_the_question(tmp_path):
+    text = "subject,grade\na,1\nb,2\nc,3\nd,1\n"
+    assert table(tmp_path, text, '[covariates.grade]\nkind = "continuous"').remarks == ()
+    text = "subject,age [months]\na,6\nb,24\nc,6.0\n"
+    read = table(tmp_path, text, '[covariates.age]\nkind = "binary"')
+    assert read.covariates[0].levels == ("6", "24")
+    np.testing.assert_array_equal(read.values[:, 0], [-1, 1, -1])
+
+
+@pytest.mark.parametrize(
+    ("cells", "levels", "values"),
+    [
+        ("M m male F f woman", ("F", "M"), [1, 1, 1, -1, -1, -1]),
+        ("yes no Y N TRUE False", ("N", "Y"), [1, -1, 1, -1, 1, -1]),
+        ("Left left right RIGHT L r", ("L", "r"), [-1, -1, 1, 1, -1, 1]),
+        ("shunt Shunt none? none? shunt none?", ("none?", "shunt"), [1, 1, -1, -1, 1, -1]),
+        ("+ - + - - +", ("+", "-"), [-1, 1, -1, 1, 1, -1]),
+        ("0 1.0 1 0.0 0 1", ("0", "1"), [-1, 1, 1, -1, -1, 1]),
+    ],
+)
+def test_spellings_of_a_level_are_one(tmp_path, cells, levels, values):
+    rows = "".join(f"p{i},{cell}\n" for i, cell in enumerate(cells.split()))
+    read = table(tmp_path, "subject,level\n" + rows)
+    assert read.covariates[0].levels == levels
+    np.testing.assert_array_equal(read.values[:, 0], values)
+    assert {one.severity for one in read.remarks} <= {"fine"}
+
+
+def test_levels_of_the_toml_are_found_in_any_spelling(tmp_path):
+    read = table(tmp_path, "subject,sex\na,male\nb,f\nc,M\n", '[covariates.sex]\nlevels = ["M", "F"]')
+    np.testing.assert_array_equal(read.values[:, 0], [-1, 1, -1])
+    read = table(tmp_path, "subject,op\na,none\nb,shunt\n", '[covariates.op]\nlevels = ["none", "shunt"]')
+    np.testing.assert_array_equal(read.values[:, 0], [-1, 1])
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("subject,age,Age\na,1,2\nb,2,3\n", "both 'age' and 'Age'"),
+        ("subject,age\na,1\n", "has one row"),
+        ("subject,op\na,none\nb,shunt\nc,shunt\n", 'write levels = ["none", "shunt"] into the TOML'),
+        ("subject,sex\na,F\nb,M\nc,F\nd,M\ne,unclear\n", "unclear is in row 6"),
+        ("subject,w\na,1.234\nb,12,5\n", "row 3 has 3 cells"),
+        ("subject;w\na;1.234\nb;12,5\n", "which may be 1.234 or 1234"),
+        ("subject,age\na,1e308\nb,2\n", "larger than anything that is measured"),
+    ],
+)
+def test_what_may_mean_two_things_is_refused(tmp_path, text, words):
+    with pytest.raises(InputError) as caught:
+        table(tmp_path, text)
+    assert words in str(caught.value)
+
+
+def test_what_was_understood_is_summed_up(tmp_path):
+    summary = "\n".join(table(tmp_path, GOOD).summary)
+    for words in (
+        "4 rows, 3 subjects",
+        "age [months]: a number from 12 to 200, median 67",
+        "sex: F in 2 rows, M in 2 rows",
+        "operated: 0 in 3 rows, 1 in 1 row",
+        "TOML",
+    ):
+        assert words in summary
+
+
+def test_names_with_marks_are_names(tmp_path):
+    names = ['"a,b"', "a=b", "../../evil", "<b>age</b>"]
+    read = table(tmp_path, f"subject,{','.join(names)}\np,1,2,3,4\nq,2,3,4,5\nr,4,6,7,8\n")
+    assert [covariate.name for covariate in read.covariates] == ["a,b", "a=b", "../../evil", "<b>age</b>"]
+
+
+def test_files_are_found_however_their_paths_are_written(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    (tmp_path / "home").mkdir()
+    (tmp_path / "scans").mkdir()
+    here = [tmp_path / "scans" / "p 1.stl", tmp_path / "home" / "p2.stl"]
+    for path in here:
+        path.write_text("")
+    cells = ["scans\\p 1.stl", ".\\scans\\p 1.stl", here[0].as_uri(), "~/p2.stl", str(here[1])]
+    rows = "".join(f"{cell},p{i},{i}\n" for i, cell in enumerate(cells))
+    read = table(tmp_path, "mesh,subject,age\n" + rows)
+    assert [row.mesh.resolve() for row in read.rows] == [here[i] for i in (0, 0, 0, 1, 1)]
+    assert missing_files(read) == ()
+
+
+@pytest.mark.skipif(os.sep != "/", reason="these paths are missing elsewhere only")
+def test_files_that_are_missing_are_told_with_what_may_be_meant(tmp_path):
+    (tmp_path / "P01.STL").write_text("")
+    cells = ["p01.stl", "C:\\scans\\p02.stl", "https://host/p03.stl", "p04.stl", "p" * 300]
+    rows = "".join(f"{cell},p{i},{i}\n" for i, cell in enumerate(cells))
+    found = missing_files(table(tmp_path, "mesh,subject,age\n" + rows))
+    for words, sentence in zip(
+        ["'P01.STL'", "Windows", "an address", "correct", "correct"], found, strict=True
+    ):
+        assert words in sentence
 
 
 def test_a_covariate_constant_in_training_is_explained(tmp_path):
