@@ -18,7 +18,10 @@ ROOT = Path(__file__).parents[1]
 FLOORS = {
     "naisr_model": (
         ("__init__",),
-        ("errors", "files", "shipped", "covariates", "frames", "config", "progress", "capabilities"),
+        (
+            *("errors", "files", "shipped", "records", "covariates"),
+            *("frames", "config", "progress", "capabilities"),
+        ),
         ("work",),
         ("data",),
         ("models",),

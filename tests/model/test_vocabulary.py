@@ -40,7 +40,7 @@ def test_a_covariate_reads_what_people_write():
 
 def test_missing_covariates_are_at_the_centre_and_others_are_checked():
     assert complete((AGE, SEX), {"age": 12}) == {"age": 12.0, "sex": 0.0}
-    with pytest.raises(InputError, match=r"412 months.*1 to 233; give a value within that"):
+    with pytest.raises(InputError, match=r"412 months.*1 to 233 months; give a value within that"):
         complete((AGE, SEX), {"age": 412})
     assert complete((AGE, SEX), {"age": 412}, extrapolate=True)["age"] == 412
     with pytest.raises(InputError, match="unknown covariate 'height'"):
