@@ -6,6 +6,7 @@ The format stores arrays and text only, so opening a file never executes anythin
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -85,6 +86,18 @@ class Checkpoint:
             raise ValueError(f"'{wrong[0]}' holds what is no finite number")
         if not np.isfinite(self.latents).all():
             raise ValueError("the codes hold what is no finite number")
+        if not (self._distances().abs() <= FARTHEST).all():
+            raise ValueError("its networks give no distances")
+
+    @torch.inference_mode()
+    def _distances(self) -> Tensor:
+        """Phi at the corners and the middle of the box, at the centre and both ends of the covariates."""
+        dim, covariates = self.frame.dim, self.population.covariates
+        points = torch.tensor([*itertools.product((-1.0, 1.0), repeat=dim), (0.0,) * dim])
+        ends = np.array([c.normalise((c.centre, *c.range)) for c in covariates]).reshape(-1, 3)
+        values = torch.as_tensor(ends.T, dtype=torch.float32)
+        codes = torch.zeros(3, self.preset.network.latent)
+        return self.model()(points.expand(3, -1, -1), values, codes)
 
 
 def save(path: Path, checkpoint: Checkpoint) -> None:
@@ -165,17 +178,26 @@ _MESHES = {
 
 _OTHERS = {
     b"PK": "a zip archive or a PyTorch file",
-    b"\x80": "a PyTorch file",
+    b"\x80\x02": "a pickle",
+    b"\x80\x03": "a pickle",
+    b"\x80\x04": "a pickle",
+    b"\x80\x05": "a pickle",
     b"{": "a JSON file",
     b"mesh,": "a table",
 }
 """What other files begin with that are at hand where an atlas is."""
 
+BEGINNING = 512
+"""Bytes of a file that tell what it is."""
+
+FARTHEST = 1e6
+"""Model units; the box is 2 wide, so no distance is larger."""
+
 
 def _foreign(path: Path) -> str:
     """What a file is that is no .safetensors file, by its contents, and what to do."""
     with path.open("rb") as file:
-        begin = file.read(352)
+        begin = file.read(BEGINNING)
     if not begin:
         return "is empty, not a complete .safetensors file; copy it again, or train it again"
     scan = next((title for magic, title in _MESHES.items() if begin.startswith(magic)), "")
@@ -183,6 +205,8 @@ def _foreign(path: Path) -> str:
         scan = "an STL mesh"
     if begin[344:347] in (b"n+1", b"ni1"):
         scan = "a NIfTI volume"
+    if b"\nv " in begin:
+        scan = "an OBJ mesh"
     if scan:
         return (
             f"is {scan}, not an atlas; open it as a scan: 'Open scan…' in the window, --scan {path.name} or "

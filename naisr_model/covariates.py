@@ -338,6 +338,55 @@ def require_known(names: Iterable[str], covariates: Iterable[Covariate]) -> None
         raise InputError(f"unknown covariate '{unknown[0]}'; {there}")
 
 
+def read_values(option: str, texts: Iterable[str], covariates: Iterable[Covariate]) -> dict[str, float]:
+    """What was set as ``age=120`` or ``age=120,sex=M``, in real units.
+
+    Names with commas or equals signs of their own are found among those of the covariates.
+
+    Args:
+        option: the settings stand behind it, as ``--set``.
+        texts: of one or more settings each.
+        covariates: of the atlas.
+
+    Raises:
+        InputError: for what is no setting, an unknown name, a name that is given twice or a value that its
+            covariate cannot take.
+    """
+    known = {covariate.name: covariate for covariate in covariates}
+    values: dict[str, float] = {}
+    for setting in (setting for text in texts for setting in _settings(option, text, known)):
+        own = (name for name in known if setting.startswith(f"{name}="))
+        name = max(own, key=len, default=setting.partition("=")[0].rstrip())
+        if name in values:
+            raise InputError(f"'{name}' is given twice after {option}; give it once")
+        if known and name not in known:
+            raise InputError(
+                f"unknown covariate '{name}' after {option}; write NAME=VALUE with one of {', '.join(known)}"
+            )
+        require_known([name], known.values())
+        values[name] = known[name].parse(setting[setting.index("=", len(name)) + 1 :])
+    return values
+
+
+def _settings(option: str, text: str, known: Collection[str]) -> list[str]:
+    """The parts between commas; those within a known name do not count."""
+    settings: list[str] = []
+    begun = ""
+    for part in filter(str.strip, text.split(",")):
+        whole = f"{begun},{part}".lstrip() if begun else part.lstrip()
+        if "=" not in part:
+            begun = whole
+        elif begun and not any(whole.startswith(f"{name}=") for name in known):
+            break
+        else:
+            begun = ""
+            settings.append(whole)
+    if begun or not settings:
+        there = f"one of {', '.join(known)}" if known else "a covariate of an atlas that has some"
+        raise InputError(f"'{begun or text}' after {option} is not understood; write NAME=VALUE with {there}")
+    return settings
+
+
 def complete(
     covariates: tuple[Covariate, ...], values: Values, *, extrapolate: bool = False
 ) -> dict[str, float]:

@@ -62,7 +62,7 @@ class Frame:
         if dim not in (2, 3):
             raise ValueError(f"the centre of the frame has {dim} coordinates")
         if not SCALES_MM[0] <= scale_mm <= SCALES_MM[1] or np.abs(centre_mm).max() > SCALES_MM[1]:
-            raise ValueError(f"the frame is {scale_mm:g} mm a unit, its centre at {centre_mm.tolist()} mm")
+            raise ValueError(f"a frame of {scale_mm:g} mm a unit about {np.round(centre_mm, 3).tolist()} mm")
         return cls(tuple(map(float, centre_mm)), scale_mm)
 
 

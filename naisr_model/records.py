@@ -41,6 +41,8 @@ def parsed(text: str) -> dict[str, Any]:
         record = json.loads(text)
     except RecursionError as error:
         raise ValueError("it is nested too deeply") from error
+    except ValueError as error:
+        raise ValueError("it is no JSON") from error
     return _of_kind(record, dict, "it")
 
 

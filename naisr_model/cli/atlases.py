@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from naisr_model.cli.options import AtlasFile, covariate_values
+from naisr_model.cli.options import AtlasFile, FileToWrite
 from naisr_model.errors import InputError
 from naisr_model.files import replacing
 
@@ -58,7 +59,8 @@ def info(atlas: AtlasFile) -> None:
     print(f"box: {2 * checkpoint.frame.scale_mm:.0f} mm wide, alignment by {checkpoint.alignment.method}")
     if checkpoint.source:
         print(f"source: {', '.join(f'{key} {value}' for key, value in checkpoint.source.items())}")
-    told = [say(checkpoint.training[key]) for key, say in TRAINED.items() if key in checkpoint.training]
+    measured = {key: value for key, value in checkpoint.training.items() if math.isfinite(value)}
+    told = [say(measured[key]) for key, say in TRAINED.items() if key in measured]
     print(f"training: {', '.join(told)}")
 
 
@@ -79,7 +81,7 @@ def _extent(covariate: Covariate) -> str:
 
 def mesh(
     atlas: Path,
-    out: Path,
+    out: FileToWrite,
     *,
     set: Annotated[list[str] | None, Parameter(name="--set")] = None,
     effect: str | None = None,
@@ -101,7 +103,7 @@ def mesh(
         device: where the networks are evaluated: cpu, cuda or mps.
     """
     from naisr_model.atlas import Atlas
-    from naisr_model.covariates import require_known
+    from naisr_model.covariates import read_values, require_known
 
     if out.suffix.lower() not in (".stl", ".ply", ".obj", ".glb"):
         raise InputError(f"cannot write '{out.suffix}'; name the file .stl, .ply, .obj or .glb")
@@ -110,7 +112,7 @@ def mesh(
     loaded = Atlas.load(atlas, device)
     if set and not loaded.covariates:
         raise InputError(f"shapes of {loaded.model_title} depend on no covariates; leave out --set")
-    values = covariate_values(set or [], loaded.covariates)
+    values = read_values("--set", set or [], loaded.covariates)
     if template:
         if not loaded.capabilities.has_template:
             raise InputError(f"{loaded.model_title} has no template; leave out --template")

@@ -30,8 +30,8 @@ SHAPES = "shapes"
 KINDS = ("surface", "near", "uniform")
 MESH = "mesh.ply"
 
-FARTHEST = 100.0
-"""Model units; the box is 2 wide, and samples that belong to it lie within and not far around."""
+FARTHEST = 1e6
+"""Model units beyond which a sample is damage; the box is 2 wide."""
 
 
 class Draw(NamedTuple):
@@ -193,13 +193,19 @@ def _read_mesh(path: Path) -> trimesh.Trimesh:
 
 
 def is_whole(folder: Path, counts: Mapping[str, int], dim: int) -> bool:
-    """Whether a shape's folder holds its mesh and so many samples of each kind in ``dim`` dimensions."""
+    """Whether a shape's folder holds its mesh and so many samples of each kind, in ``dim`` dimensions."""
     try:
         blocks = {kind: _find_block(folder / f"{kind}.npy", kind, dim) for kind in counts}
         _read_mesh(folder / MESH)
     except InputError:
         return False
-    return all(blocks[kind].rows == count for kind, count in counts.items())
+    return all(blocks[kind].rows == count and _are_sound(blocks[kind]) for kind, count in counts.items())
+
+
+def _are_sound(block: _Block) -> bool:
+    """Whether all samples of a file are numbers that can be of a shape in the box."""
+    samples = np.fromfile(block.path, np.float32, block.rows * block.columns, offset=block.offset)
+    return len(samples) == block.rows * block.columns and bool((np.abs(samples) <= FARTHEST).all())
 
 
 def _damaged(path: Path, what: str) -> InputError:
