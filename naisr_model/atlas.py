@@ -382,7 +382,10 @@ class Atlas:
                 f"resolution is {resolution}; give a multiple of {COARSEST} from {2 * COARSEST} to {FINEST}"
             )
         lattice = Lattice(resolution)
-        return isosurface(evaluate_band(field, lattice, progress, guess), lattice, self.frame)
+        surface = isosurface(evaluate_band(field, lattice, progress, guess), lattice, self.frame)
+        if not np.isfinite(surface.vertices).all():
+            raise InputError("there are no distances at these values; choose others nearer to the data")
+        return surface
 
 
 @dataclass(frozen=True, eq=False)

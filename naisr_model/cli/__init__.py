@@ -68,6 +68,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         print(f"naisr: {error.strerror or error}: {error.filename or ''}", file=sys.stderr)
         return 2
+    except MemoryError:
+        print(
+            "naisr: this machine's memory does not suffice; ask for less, as a lower resolution",
+            file=sys.stderr,
+        )
+        return 2
     except (Cancelled, KeyboardInterrupt):
         print("naisr: stopped; what was finished is kept", file=sys.stderr)
         return 130

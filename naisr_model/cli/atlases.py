@@ -127,7 +127,8 @@ def mesh(
     else:
         surface = loaded.shape(values, None, resolution, extrapolate=extrapolate)
     if not len(surface.faces):
-        raise InputError("there is no surface at these covariates; choose values nearer to the data")
+        nearer = "train the atlas for longer" if not values else "choose values nearer to the data"
+        raise InputError(f"the atlas has no surface there; {nearer}")
     with replacing(out) as temporary:
         surface.export(temporary)
     print(f"{out}: {len(surface.faces)} faces, {surface.volume / 1000:.2f} cm³")

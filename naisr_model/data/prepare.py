@@ -159,9 +159,11 @@ def _checked_table(csv: str | Path, options: PrepareOptions) -> ShapeTable:
         raise InputError(f"the held-out share is {options.held_out:g}; give a number from 0 to below 1")
     for kind in store.KINDS:
         if not 1 <= (count := getattr(options, f"{kind}_samples")) <= MOST_SAMPLES:
-            raise InputError(f"{count} {kind} samples a shape were asked for; give 1 to {MOST_SAMPLES}")
+            raise InputError(
+                f"{count} {kind} samples a shape were asked for; give at least 1, at most {MOST_SAMPLES}"
+            )
     if not 0 <= options.seed < 2**32:
-        raise InputError(f"the seed is {options.seed}; give 0 to {2**32 - 1}")
+        raise InputError(f"the seed is {options.seed}; give 0 or more, up to {2**32 - 1}")
     table = tables.read_table(csv)
     if any(row.mesh == Path(csv).parent for row in table.rows):
         raise InputError(f"{Path(csv).name} has no column 'mesh'; add one with the path of each mesh")

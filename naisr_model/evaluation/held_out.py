@@ -108,7 +108,7 @@ def require_shapes(atlas: Atlas, store: Path | None, limit: int = 0) -> None:
     elif strangers := [one for one in _held_out_visits(atlas.population) if one not in source_visits(atlas)]:
         subject, visit = strangers[0]
         raise InputError(
-            f"the held-out subject '{subject}', visit '{visit}' is not in the population that the atlas names; "
+            f"subject '{subject}', visit '{visit}' is not in the population that the atlas names; "
             "give the store it was trained on with --store"
         )
 

@@ -86,9 +86,9 @@ def require_size(seed: int, patients: int) -> None:
         InputError: when there is nobody, there are too many, or the seed is none.
     """
     if not 1 <= patients <= MOST_PATIENTS:
-        raise InputError(f"{patients} patients were asked for; give 1 to {MOST_PATIENTS}")
+        raise InputError(f"{patients} patients were asked for; give at least 1, at most {MOST_PATIENTS}")
     if not 0 <= seed < 2**32:
-        raise InputError(f"the seed is {seed}; give 0 to {2**32 - 1}")
+        raise InputError(f"the seed is {seed}; give 0 or more, up to {2**32 - 1}")
 
 
 def population(name: str) -> PopulationModule:

@@ -116,7 +116,7 @@ def _model() -> _Model:
         from anny.shape_distribution import SimpleShapeDistribution
     except ImportError as error:
         raise InputError(
-            "the bodies population needs the package anny; pip install 'naisr-atlas-explorer[bodies]'"
+            "the bodies population needs the package anny; install it with: pip install anny"
         ) from error
     # The package's defaults compress the shapes, which takes minutes, and compile code at first use.
     body = anny.Anny(phenotype_blendshapes="original", skinning_method="lbs").to(dtype=torch.float64)

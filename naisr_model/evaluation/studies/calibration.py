@@ -61,7 +61,7 @@ class Calibration:
                 an unknown name.
         """
         if not 1 <= self.patients <= MOST_PATIENTS // 2:
-            raise InputError(f"--patients is {self.patients}; give 1 to {MOST_PATIENTS // 2}")
+            raise InputError(f"--patients is {self.patients}; give 1 or more, up to {MOST_PATIENTS // 2}")
         atlas = opened(self.atlas)
         known_population(atlas)
         require_known(self._told(), atlas.covariates)

@@ -67,7 +67,7 @@ class Fitting:
         if self.limit < 1:
             raise InputError(f"--limit is {self.limit}; give 1 or more")
         if not 1 <= self.steps <= MOST_STEPS:
-            raise InputError(f"--steps is {self.steps}; give 1 to {MOST_STEPS}")
+            raise InputError(f"--steps is {self.steps}; give 1 or more, up to {MOST_STEPS}")
         atlas = opened(self.atlas)
         require_shapes(atlas, self.store, self.limit)
         return [HeldOutRow(row) for row in held_out_rows(atlas, self.limit)]
