@@ -104,7 +104,7 @@ class Covariate:
             value = math.nan if "_" in text else float(text)  # to Python 1_5 is 15
         except ValueError:
             value = math.nan
-        if not math.isfinite(value):
+        if not abs(value) <= records.LARGEST:
             raise InputError(f"covariate '{self.name}' is '{text}'; expected {self.expected}")
         return value
 
@@ -399,7 +399,7 @@ def complete(
     require_known(values, covariates)
     for covariate in covariates:
         value = values.get(covariate.name, covariate.centre)
-        if not math.isfinite(value):
+        if not abs(value) <= records.LARGEST:
             raise InputError(f"covariate '{covariate.name}' is {value}; give a finite number")
         if not extrapolate and not covariate.contains(value):
             raise InputError(
