@@ -195,7 +195,8 @@ def test_networks_too_large_for_any_machine_are_refused_before_they_are_made(egg
 @pytest.fixture(scope="module")
 def stopped(egg_store, tmp_path_factory) -> Path:
     """An atlas in training, and the state beside it."""
-    out, seen = tmp_path_factory.mktemp("stopped") / "a.safetensors", []
+    out = tmp_path_factory.mktemp("stopped") / "a.safetensors"
+    seen: list[training.Report] = []
     with pytest.raises(Cancelled):
         train(
             egg_store,
