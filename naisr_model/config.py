@@ -32,18 +32,21 @@ class Range:
     low: float
     high: float
 
-    def require(self, name: str, value: float) -> None:
+    def require(self, name: str, value: Any, kind: type) -> None:
         """Make sure that a value is within.
 
         Args:
             name: of the setting, as ``training.epochs``.
             value: that it has.
+            kind: ``int`` where it has to be a whole number.
 
         Raises:
-            InputError: when it is not, and for what is no number.
+            InputError: when it is not, and for what is no such number.
         """
-        if not self.low <= value <= self.high:
-            given = f"give {self.low:.10g} to {self.high:.10g}"
+        is_number = isinstance(value, int) or (kind is float and isinstance(value, float))
+        if not is_number or not self.low <= value <= self.high:
+            whole = "a whole number from " if kind is int and isinstance(value, float) else ""
+            given = f"give {whole}{self.low:.10g} to {self.high:.10g}"
             raise InputError(f"the setting '{name}' is {shortened(value)}; {given}")
 
 
@@ -244,7 +247,7 @@ def require_ranges(config: Any, where: str = "") -> None:
 def _require_in_range(hint: Any, values: tuple[Any, ...], name: str) -> None:
     for limits in getattr(hint, "__metadata__", ()):
         for value in values:
-            limits.require(name, value)
+            limits.require(name, value, hint.__origin__)
 
 
 def _converted(kind: Any, value: Any, base: Any, where: str) -> Any:

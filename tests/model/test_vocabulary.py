@@ -148,6 +148,8 @@ def test_every_number_among_the_settings_has_a_range(name):
 
 
 def test_ranges_hold_in_lists_and_say_what_they_take():
+    with pytest.raises(InputError, match=r"'training.epochs' is 2.5; give a whole number from 1 to 1000000"):
+        require_ranges(changed(preset("demo"), "training.epochs", 2.5))
     wrong = changed(preset("demo"), "training.template_epochs", (5, 0))
     with pytest.raises(InputError, match=r"'training.template_epochs' is 0; give 1 to 1000000"):
         require_ranges(wrong)

@@ -159,6 +159,8 @@ def make_task(store: SampleStore, preset: Preset, out: Path, budget_s: float, de
     Raises:
         InputError: when settings, model and data do not fit, or torch cannot compute on ``device``.
     """
+    if not out.name or out.is_dir():
+        raise InputError(f"'{out}' is a folder; give the name of the .safetensors file to write")
     _check(preset)
     if preset.network.dim != store.frame.dim:
         raise InputError(

@@ -1,4 +1,4 @@
-"""What stands after an option is refused at once where it cannot be meant, before a file is read or written."""
+"""What stands after an option is refused at once where it cannot be meant."""
 
 from __future__ import annotations
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+from functools import partial
 
 import pytest
 import torch
@@ -27,6 +28,10 @@ def opened(qtbot, tmp_path):
     gc.collect()
 
 
+def tells(window, words: str) -> bool:
+    return words in window.error_text.text()
+
+
 def test_broken_atlases_are_explained_one_after_the_other(opened, tmp_path):
     window, controller = opened
     save(tmp_path / "good.safetensors", untrained())
@@ -44,5 +49,5 @@ def test_broken_atlases_are_explained_one_after_the_other(opened, tmp_path):
     egg(5.0, 1.0).export(tmp_path / "mesh.stl")
     for name, words in files.items():
         controller.open(tmp_path / name)
-        wait_until(lambda words=words: words in window.error_text.text(), 60)
+        wait_until(partial(tells, window, words), 60)
         assert controller.state.atlas is None

@@ -185,6 +185,12 @@ def test_a_setting_out_of_range_is_named_before_anything_is_written(egg_store, t
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_folder_is_no_atlas_to_write(egg_store, tmp_path):
+    for folder in (tmp_path, Path()):
+        with pytest.raises(InputError, match="is a folder; give the name of the"):
+            train(egg_store, egg_preset(epochs=1), folder)
+
+
 def test_networks_too_large_for_any_machine_are_refused_before_they_are_made(egg_store, tmp_path):
     plain = egg_preset(epochs=1)
     network = dataclasses.replace(plain.network, template=SirenConfig(4096, 64))
