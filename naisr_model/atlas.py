@@ -56,6 +56,9 @@ from naisr_model.surface.tracking import CodeTracker, FadingTracker, Tracker, ma
 from naisr_model.surface.volume import enclosed_volume
 
 VOLUME_RESOLUTION = 128
+FINEST = 1024
+"""Of the resolutions: its lattice takes 4 GB."""
+
 CHECK_SAMPLE = 2000
 """Seed of the points at which a fit's residual is measured; the fit itself draws others."""
 
@@ -374,12 +377,15 @@ class Atlas:
     ) -> trimesh.Trimesh:
         if self.frame.dim != 3:
             raise InputError("surfaces are made of 3D atlases; this one holds curves in the plane")
-        if resolution < 2 * COARSEST or resolution % COARSEST:
+        if not 2 * COARSEST <= resolution <= FINEST or resolution % COARSEST:
             raise InputError(
-                f"resolution is {resolution}; give a multiple of {COARSEST} from {2 * COARSEST} on"
+                f"resolution is {resolution}; give a multiple of {COARSEST} from {2 * COARSEST} to {FINEST}"
             )
         lattice = Lattice(resolution)
-        return isosurface(evaluate_band(field, lattice, progress, guess), lattice, self.frame)
+        surface = isosurface(evaluate_band(field, lattice, progress, guess), lattice, self.frame)
+        if not np.isfinite(surface.vertices).all():
+            raise InputError("there are no distances at these values; choose others nearer to the data")
+        return surface
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,15 +7,54 @@ a model's networks and its named presets stand with the model, see :mod:`naisr_m
 from __future__ import annotations
 
 import dataclasses
+import math
 import tomllib
 import typing
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from reprlib import repr as shortened
+from typing import Annotated, Any, TypeVar
 
 from naisr_model.errors import InputError
 
 C = TypeVar("C")
+
+
+@dataclass(frozen=True)
+class Range:
+    """What a number may be, both ends included; it stands beside the type of a setting.
+
+    Attributes:
+        low: the smallest.
+        high: the largest.
+    """
+
+    low: float
+    high: float
+
+    def require(self, name: str, value: Any, kind: type) -> None:
+        """Make sure that a value is within.
+
+        Args:
+            name: of the setting, as ``training.epochs``.
+            value: that it has.
+            kind: ``int`` where it has to be a whole number.
+
+        Raises:
+            InputError: when it is not, and for what is no such number.
+        """
+        is_number = isinstance(value, int) or (kind is float and isinstance(value, float))
+        if not is_number or not self.low <= value <= self.high:
+            whole = "a whole number from " if kind is int and isinstance(value, float) else ""
+            given = f"give {whole}{self.low:.10g} to {self.high:.10g}"
+            raise InputError(f"the setting '{name}' is {shortened(value)}; {given}")
+
+
+Count = Annotated[int, Range(1, 1_000_000)]
+Rate = Annotated[float, Range(1e-9, 1000)]
+Weight = Annotated[float, Range(0, 1e6)]
+Share = Annotated[float, Range(0, 1)]
+Seed = Annotated[int, Range(0, 2**32 - 1)]
 
 
 @dataclass(frozen=True)
@@ -28,9 +67,9 @@ class SirenConfig:
         omega0: frequency of the sines; a lower one gives a smoother function.
     """
 
-    width: int = 256
-    hidden: int = 4
-    omega0: float = 30.0
+    width: Annotated[int, Range(1, 4096)] = 256
+    hidden: Annotated[int, Range(0, 64)] = 4
+    omega0: Annotated[float, Range(1e-3, 1e4)] = 30.0
 
 
 @dataclass(frozen=True)
@@ -42,8 +81,8 @@ class NetworkConfig:
         latent: length of the latent code z.
     """
 
-    dim: int = 3
-    latent: int = 256
+    dim: Annotated[int, Range(2, 3)] = 3
+    latent: Annotated[int, Range(1, 4096)] = 256
 
 
 @dataclass(frozen=True)
@@ -69,19 +108,19 @@ class LossWeights:
         folding: mean of max(0, -det(I + grad d)) at surface points; 0 leaves it out.
     """
 
-    surface_eikonal: float = 10.0
-    surface_distance: float = 30.0
-    surface_normal: float = 10.0
-    space_distance: float = 100.0
-    space_eikonal: float = 10.0
-    template_eikonal: float = 0.0
-    first_order: float = 0.0
-    first_order_reach: float = 0.1
-    latent: float = 2.0
-    latent_sigma: float = 0.01
-    centring: float = 0.0
-    ridge: float = 0.0
-    folding: float = 0.0
+    surface_eikonal: Weight = 10.0
+    surface_distance: Weight = 30.0
+    surface_normal: Weight = 10.0
+    space_distance: Weight = 100.0
+    space_eikonal: Weight = 10.0
+    template_eikonal: Weight = 0.0
+    first_order: Weight = 0.0
+    first_order_reach: Annotated[float, Range(1e-6, 1e6)] = 0.1
+    latent: Weight = 2.0
+    latent_sigma: Annotated[float, Range(1e-6, 1e3)] = 0.01
+    centring: Weight = 0.0
+    ridge: Weight = 0.0
+    folding: Weight = 0.0
 
 
 @dataclass(frozen=True)
@@ -107,19 +146,19 @@ class TrainingConfig:
         loss: weights of the terms.
     """
 
-    epochs: int = 3000
-    batch_shapes: int = 64
-    surface_points: int = 500
-    near_points: int = 200
-    uniform_points: int = 50
-    template_rate: float = 5e-5
-    displacement_rate: float = 5e-5
-    latent_rate: float = 1e-3
+    epochs: Count = 3000
+    batch_shapes: Count = 64
+    surface_points: Count = 500
+    near_points: Count = 200
+    uniform_points: Count = 50
+    template_rate: Rate = 5e-5
+    displacement_rate: Rate = 5e-5
+    latent_rate: Rate = 1e-3
     cosine: bool = False
-    population_share: float = 0.0
+    population_share: Share = 0.0
     residual_latents: bool = False
-    template_epochs: tuple[int, ...] = ()
-    seed: int = 0
+    template_epochs: tuple[Count, ...] = ()
+    seed: Seed = 0
     loss: LossWeights = field(default_factory=LossWeights)
 
     @property
@@ -155,11 +194,11 @@ class FitConfig:
         seed: of the draws.
     """
 
-    steps: int = 800
-    rate: float = 5e-3
-    surface_points: int = 500
-    space_points: int = 250
-    seed: int = 0
+    steps: Count = 800
+    rate: Rate = 5e-3
+    surface_points: Count = 500
+    space_points: Annotated[int, Range(2, 1_000_000)] = 250
+    seed: Seed = 0
 
 
 def to_json(config: Any) -> dict[str, Any]:
@@ -171,7 +210,7 @@ def from_json(base: C, record: dict[str, Any], where: str = "") -> C:
     """``base`` with the settings of a record that :func:`to_json` gave; keys left out stay as they are.
 
     Raises:
-        InputError: for a key that ``base`` does not have or a value of another type.
+        InputError: for a key that ``base`` does not have, a value of another type or one out of range.
     """
     hints = typing.get_type_hints(type(base))
     if unknown := sorted(set(record) - set(hints)):
@@ -180,24 +219,52 @@ def from_json(base: C, record: dict[str, Any], where: str = "") -> C:
         key: _converted(hints[key], value, getattr(base, key), f"{where}{key}")
         for key, value in record.items()
     }
-    return dataclasses.replace(base, **changes)  # type: ignore[type-var]
+    changed: C = dataclasses.replace(base, **changes)  # type: ignore[type-var]
+    require_ranges(changed, where)
+    return changed
+
+
+def require_ranges(config: Any, where: str = "") -> None:
+    """Make sure that every setting is in the range that stands beside its type.
+
+    Args:
+        config: settings, with others within.
+        where: what stands before their names in a sentence.
+
+    Raises:
+        InputError: for the first that is not.
+    """
+    for key, hint in typing.get_type_hints(type(config), include_extras=True).items():
+        value = getattr(config, key)
+        if dataclasses.is_dataclass(value):
+            require_ranges(value, f"{where}{key}.")
+        elif typing.get_origin(hint) is tuple:
+            _require_in_range(typing.get_args(hint)[0], value, f"{where}{key}")
+        else:
+            _require_in_range(hint, (value,), f"{where}{key}")
+
+
+def _require_in_range(hint: Any, values: tuple[Any, ...], name: str) -> None:
+    for limits in getattr(hint, "__metadata__", ()):
+        for value in values:
+            limits.require(name, value, hint.__origin__)
 
 
 def _converted(kind: Any, value: Any, base: Any, where: str) -> Any:
     """``value`` as the setting that is now ``base``, which a nested config's type is taken from."""
     if dataclasses.is_dataclass(base):
         if not isinstance(value, dict):
-            raise InputError(f"setting '{where}' is {value!r}; expected a table")
+            raise InputError(f"setting '{where}' is {shortened(value)}; expected a table")
         return from_json(base, value, f"{where}.")
     if typing.get_origin(kind) is tuple:
         (one, _) = typing.get_args(kind)
         if not isinstance(value, list | tuple):
-            raise InputError(f"setting '{where}' is {value!r}; expected a list of {one.__name__}")
+            raise InputError(f"setting '{where}' is {shortened(value)}; expected a list of {one.__name__}")
         return tuple(_converted(one, each, None, where) for each in value)
     if kind is float and isinstance(value, int) and not isinstance(value, bool):
-        return float(value)
+        return float(value) if abs(value) < 2**1000 else math.inf
     if not isinstance(value, kind) or isinstance(value, bool) is not (kind is bool):
-        raise InputError(f"setting '{where}' is {value!r}; expected {kind.__name__}")
+        raise InputError(f"setting '{where}' is {shortened(value)}; expected {kind.__name__}")
     return value
 
 
@@ -205,11 +272,11 @@ def read_toml(path: Path, base: Preset) -> Preset:
     """``base`` with the settings of a TOML file (tables ``network`` and ``training``) on top.
 
     Raises:
-        InputError: for an unreadable file, an unknown setting or a value of the wrong type.
+        InputError: for an unreadable file, an unknown setting, a value of the wrong type or out of range.
     """
     try:
         record = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"cannot read the settings in {path}: {error}") from error
     if (model := record.get("model", base.model)) != base.model:
         raise InputError(

@@ -10,23 +10,31 @@ import math
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from naisr_model import records
 from naisr_model.errors import InputError
 from naisr_model.numerals import read_number
 
 Kind = Literal["continuous", "binary"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
 Values = Mapping[str, float]
 """Covariate values in real units by name; for a binary covariate -1 ... +1."""
 
 BANDWIDTH = 0.3
 """Of the kernel that makes the growth path, in standard deviations of the covariate that moves."""
 
+PRINTED_DIGITS = 4
+"""Of a value for people, unless the digits after the point say enough: :attr:`Covariate.decimals`."""
+
 RANGE_SLACK = 1e-9
-"""Real units that a value may be out of range: to model units and back costs the last digits."""
+"""Real units that a value may be out of range at least: to model units and back costs the last digits."""
+
+SCALES = 1e6
+"""A range spans fewer standard deviations of what was observed in it."""
 
 EDGE_OF_DATA = 0.98
 """A combination lonelier than this share of the population is where there are no data."""
@@ -68,10 +76,21 @@ class Covariate:
         """The inverse of :meth:`normalise`."""
         return np.asarray(normalised, dtype=np.float64) * self.scale + self.centre
 
-    def contains(self, value: float) -> bool:
-        """Whether a real value is in the observed range."""
+    @property
+    def decimals(self) -> int:
+        """Digits after the point that tell about a thousand steps of the range apart, at most 6."""
         low, high = self.range
-        return low - RANGE_SLACK <= value <= high + RANGE_SLACK
+        return max(0, min(6, 2 - math.floor(math.log10(max(high - low, 1e-6)))))
+
+    def contains(self, value: float) -> bool:
+        """Whether a real value is in the observed range, of which the ends as they are printed are part."""
+        low, high = self.range
+        return low - self._rounding(low) <= value <= high + self._rounding(high)
+
+    def _rounding(self, end: float) -> float:
+        """How far a printed end of the range may be from the true one."""
+        digits = 10.0 ** (math.floor(math.log10(abs(end))) + 1 - PRINTED_DIGITS) if end else 0.0
+        return max(RANGE_SLACK, digits / 2, 10.0**-self.decimals / 2)
 
     def parse(self, text: str) -> float:
         """Read ``text`` as a real value: a number, or the name of a level.
@@ -83,13 +102,11 @@ class Covariate:
         if self.kind == "binary" and (named := self._named(text)):
             return (-1.0, 1.0)[self.levels.index(named)]
         try:
-            return read_number(text)
+            value = read_number(text)
         except ValueError as error:
-            expected = f"a number in {self.unit}" if self.unit else "a number"
-            if self.kind == "binary":
-                expected = " or ".join(self.levels)
-            doubt = str(error) if str(error).startswith(", which may be") else f"; expected {expected}"
+            doubt = str(error) if str(error).startswith(", which may be") else f"; expected {self.expected}"
             raise InputError(f"covariate '{self.name}' is '{text}'{doubt}") from error
+        return value
 
     def _named(self, text: str) -> str:
         """The level that is meant, in small letters or large ones; empty for none."""
@@ -102,7 +119,22 @@ class Covariate:
             if abs(value) == 1:
                 return self.levels[int(value > 0)]
             return f"between {self.levels[0]} and {self.levels[1]} ({value:+.2f})"
-        return f"{value:.4g} {self.unit}".rstrip()
+        return f"{value:.{PRINTED_DIGITS}g} {self.unit}".rstrip()
+
+    @property
+    def extent(self) -> str:
+        """The observed range as people write it: ``1 to 232.7 months``, ``F or M``."""
+        if self.kind == "binary":
+            return " or ".join(self.levels)
+        low, high = self.range
+        return f"{low:.{PRINTED_DIGITS}g} to {self.format(high)}"
+
+    @property
+    def expected(self) -> str:
+        """What :meth:`parse` reads: ``a number in months``, ``F or M``."""
+        if self.kind == "binary":
+            return " or ".join(self.levels)
+        return f"a number in {self.unit}" if self.unit else "a number"
 
     def to_json(self) -> dict[str, Any]:
         """A plain dictionary that :meth:`from_json` reads back."""
@@ -118,18 +150,23 @@ class Covariate:
 
     @classmethod
     def from_json(cls, record: dict[str, Any]) -> Covariate:
-        """The inverse of :meth:`to_json`."""
-        low, high = record["range"]
-        minus, plus = record["levels"]
-        return cls(
-            name=str(record["name"]),
-            unit=str(record["unit"]),
-            kind=record["kind"],
-            centre=float(record["centre"]),
-            scale=float(record["scale"]),
-            range=(float(low), float(high)),
-            levels=(str(minus), str(plus)),
+        """The inverse of :meth:`to_json`.
+
+        Raises:
+            ValueError: for what that never gives.
+        """
+        low, high = map(float, records.numbers(record, "range", 2))
+        covariate = cls(
+            name=records.entry(record, "name", str),
+            unit=records.entry(record, "unit", str),
+            kind=cast(Kind, records.entry(record, "kind", str)),
+            centre=records.number(record, "centre"),
+            scale=records.number(record, "scale"),
+            range=(low, high),
+            levels=_two(records.texts(record, "levels")),
         )
+        _require_sound_covariate(covariate)
+        return covariate
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,16 +260,75 @@ class Population:
 
     @classmethod
     def from_json(cls, record: dict[str, Any]) -> Population:
-        """The inverse of :meth:`to_json`."""
-        covariates = tuple(Covariate.from_json(item) for item in record["covariates"])
-        values = np.asarray(record["values"], dtype=np.float64)
-        return cls(
+        """The inverse of :meth:`to_json`.
+
+        Raises:
+            ValueError: for what that never gives.
+        """
+        covariates = tuple(map(Covariate.from_json, records.rows(record, "covariates")))
+        subjects = records.texts(record, "subjects")
+        population = cls(
             covariates=covariates,
-            subjects=tuple(map(str, record["subjects"])),
-            visits=tuple(map(str, record["visits"])),
-            values=values.reshape(len(record["subjects"]), len(covariates)),
-            held_out=np.asarray(record["held_out"], dtype=bool),
+            subjects=subjects,
+            visits=records.texts(record, "visits"),
+            values=records.numbers(record, "values", len(subjects), len(covariates)),
+            held_out=records.flags(record, "held_out"),
         )
+        _require_sound_population(population)
+        return population
+
+
+def _require_sound_covariate(covariate: Covariate) -> None:
+    """Refuse a covariate that no table can have given.
+
+    Raises:
+        ValueError: with what is wrong.
+    """
+    name, (low, high) = covariate.name, covariate.range
+    wrong = {
+        "a covariate has no name": not name.strip(),
+        f"covariate '{name}' is of the unknown kind '{covariate.kind}'": covariate.kind not in KINDS,
+        f"covariate '{name}' has the scale {covariate.scale:g}": not covariate.scale > 0,
+        f"covariate '{name}' ranges from {low:g} to {high:g}": not low < high,
+        f"covariate '{name}' has its centre at {covariate.centre:g}": not low <= covariate.centre <= high,
+        f"covariate '{name}' has twice the level '{covariate.levels[0]}'": len(set(covariate.levels)) < 2,
+        f"covariate '{name}' spans too many scales": not (high - low) / max(covariate.scale, 1e-99) < SCALES,
+    }
+    if reasons := [reason for reason, is_so in wrong.items() if is_so]:
+        raise ValueError(reasons[0])
+    if covariate.kind == "binary" and (covariate.centre, covariate.scale, low, high) != (0, 1, -1, 1):
+        raise ValueError(f"covariate '{name}' has two levels that are not -1 and 1")
+
+
+def _require_sound_population(population: Population) -> None:
+    """Refuse people that no table can have given.
+
+    Raises:
+        ValueError: with what is wrong.
+    """
+    visits = list(zip(population.subjects, population.visits, strict=False))
+    lengths = {len(population.subjects), len(population.visits), len(population.held_out)}
+    if len(lengths) > 1:
+        raise ValueError("the columns of the population differ in length")
+    if len(set(population.names)) < len(population.names):
+        raise ValueError("two covariates have the same name")
+    if len(set(visits)) < len(visits):
+        subject, visit = next(one for one in visits if visits.count(one) > 1)
+        raise ValueError(f"subject '{subject}', visit '{visit}' is there twice")
+    if population.held_out.all():
+        raise ValueError("no shape is left to train on")
+    seen = {subject for subject, held in zip(population.subjects, population.held_out, strict=True) if held}
+    if shared := sorted(seen.intersection(np.array(population.subjects)[~population.held_out].tolist())):
+        raise ValueError(f"subject '{shared[0]}' is trained on and held out")
+    for column, covariate in enumerate(population.covariates):
+        if covariate.kind == "binary" and not np.isin(population.values[:, column], (-1.0, 1.0)).all():
+            raise ValueError(f"covariate '{covariate.name}' has values beside its two levels")
+
+
+def _two(levels: tuple[str, ...]) -> tuple[str, str]:
+    if len(levels) != 2:
+        raise ValueError(f"a covariate has {len(levels)} levels instead of two")
+    return levels[0], levels[1]
 
 
 def require_known(names: Iterable[str], covariates: Iterable[Covariate]) -> None:
@@ -247,6 +343,55 @@ def require_known(names: Iterable[str], covariates: Iterable[Covariate]) -> None
         raise InputError(f"unknown covariate '{unknown[0]}'; {there}")
 
 
+def read_values(option: str, texts: Iterable[str], covariates: Iterable[Covariate]) -> dict[str, float]:
+    """What was set as ``age=120`` or ``age=120,sex=M``, in real units.
+
+    Names with commas or equals signs of their own are found among those of the covariates.
+
+    Args:
+        option: the settings stand behind it, as ``--set``.
+        texts: of one or more settings each.
+        covariates: of the atlas.
+
+    Raises:
+        InputError: for what is no setting, an unknown name, a name that is given twice or a value that its
+            covariate cannot take.
+    """
+    known = {covariate.name: covariate for covariate in covariates}
+    values: dict[str, float] = {}
+    for setting in (setting for text in texts for setting in _settings(option, text, known)):
+        own = (name for name in known if setting.startswith(f"{name}="))
+        name = max(own, key=len, default=setting.partition("=")[0].rstrip())
+        if name in values:
+            raise InputError(f"'{name}' is given twice after {option}; give it once")
+        if known and name not in known:
+            raise InputError(
+                f"unknown covariate '{name}' after {option}; write NAME=VALUE with one of {', '.join(known)}"
+            )
+        require_known([name], known.values())
+        values[name] = known[name].parse(setting[setting.index("=", len(name)) + 1 :])
+    return values
+
+
+def _settings(option: str, text: str, known: Collection[str]) -> list[str]:
+    """The parts between commas; those within a known name do not count."""
+    settings: list[str] = []
+    begun = ""
+    for part in filter(str.strip, text.split(",")):
+        whole = f"{begun},{part}".lstrip() if begun else part.lstrip()
+        if "=" not in part:
+            begun = whole
+        elif begun and not any(whole.startswith(f"{name}=") for name in known):
+            break
+        else:
+            begun = ""
+            settings.append(whole)
+    if begun or not settings:
+        there = f"one of {', '.join(known)}" if known else "a covariate of an atlas that has some"
+        raise InputError(f"'{begun or text}' after {option} is not understood; write NAME=VALUE with {there}")
+    return settings
+
+
 def complete(
     covariates: tuple[Covariate, ...], values: Values, *, extrapolate: bool = False
 ) -> dict[str, float]:
@@ -259,13 +404,12 @@ def complete(
     require_known(values, covariates)
     for covariate in covariates:
         value = values.get(covariate.name, covariate.centre)
-        low, high = covariate.range
-        if not math.isfinite(value):
+        if not abs(value) <= records.LARGEST:
             raise InputError(f"covariate '{covariate.name}' is {value}; give a finite number")
         if not extrapolate and not covariate.contains(value):
             raise InputError(
-                f"covariate '{covariate.name}' is {value:g} {covariate.unit}; the atlas was trained on "
-                f"{low:g} to {high:g}; give a value within that"
+                f"covariate '{covariate.name}' is {f'{value:g} {covariate.unit}'.rstrip()}; the atlas was "
+                f"trained on {covariate.extent}; give a value within that"
             )
     return {c.name: float(values.get(c.name, c.centre)) for c in covariates}
 

@@ -35,6 +35,25 @@ def replacing(path: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+def require_file(path: Path, kind: str) -> None:
+    """Make sure that a file can be there to be read.
+
+    Args:
+        path: of the file.
+        kind: what it should be, as ``an atlas (.safetensors)``.
+
+    Raises:
+        InputError: when there is nothing, or a folder or a device.
+    """
+    if path.is_file():
+        return
+    if path.is_dir():
+        raise InputError(f"{path} is a folder; give the path of {kind}")
+    if path.exists():
+        raise InputError(f"{path} is no regular file; give the path of {kind}")
+    raise InputError(f"there is no file {path}; give the path of {kind}")
+
+
 def sources_digest(*folders: Path) -> bytes:
     """SHA-256 of the Python sources in some folders: another one is another program, whatever its version."""
     sources = [file for folder in folders for file in sorted(folder.rglob("*.py"))]

@@ -12,6 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from naisr_model import records
+
+SCALES_MM = (1e-6, 1e9)
+"""Millimetres that a model unit may have, from far below to far above what anatomy has."""
+
 BOX_MARGIN = 1.15
 """How much wider than the widest shape the box is; far-field samples live in the margin."""
 
@@ -47,8 +52,18 @@ class Frame:
 
     @classmethod
     def from_json(cls, record: dict[str, Any]) -> Frame:
-        """The inverse of :meth:`to_json`."""
-        return cls(tuple(map(float, record["centre_mm"])), float(record["scale_mm"]))
+        """The inverse of :meth:`to_json`.
+
+        Raises:
+            ValueError: for what that never gives.
+        """
+        dim = len(records.entry(record, "centre_mm", list))
+        centre_mm, scale_mm = records.numbers(record, "centre_mm", dim), records.number(record, "scale_mm")
+        if dim not in (2, 3):
+            raise ValueError(f"the centre of the frame has {dim} coordinates")
+        if not SCALES_MM[0] <= scale_mm <= SCALES_MM[1] or np.abs(centre_mm).max() > SCALES_MM[1]:
+            raise ValueError(f"a frame of {scale_mm:g} mm a unit about {np.round(centre_mm, 3).tolist()} mm")
+        return cls(tuple(map(float, centre_mm)), scale_mm)
 
 
 def enclosing_frame(lower_mm: ArrayLike, upper_mm: ArrayLike) -> Frame:

@@ -13,6 +13,7 @@ import cyclopts
 from cyclopts import Parameter
 
 from naisr_model.errors import InputError
+from naisr_model.files import require_file
 from naisr_model.shipped import shipped_atlas
 from naisr_viewer import __version__
 from naisr_viewer.program import start
@@ -82,8 +83,7 @@ def view(
     """
     path = (atlas or shipped_atlas()).absolute()
     pixels = parse_size(size)
-    if not path.is_file():
-        raise InputError(f"there is no file {path}; give the path of an atlas (.safetensors)")
+    require_file(path, "an atlas (.safetensors)")
     if label is not None and scan is None:
         raise InputError(f"--label {label} is of a scan; give --scan FILE too")
     engine = start.make_engine(device)
@@ -102,26 +102,11 @@ def parse_settings(card: AtlasCard, settings: Sequence[str]) -> dict[str, float]
     """``["age=120", "sex=M"]`` as real values by name.
 
     Raises:
-        InputError: for an unknown covariate, no number, or a value outside the observed range.
+        InputError: for what is no setting, and for any where shapes depend on no covariates.
     """
-    known = {covariate.name: covariate for covariate in card.covariates}
-    if settings and not known:
+    if settings and not card.covariates:
         raise InputError(f"leave out --set: the shapes of {card.path.name} depend on no covariates")
-    values = {}
-    for setting in settings:
-        name, equals, text = setting.partition("=")
-        if not equals or name.strip() not in known:
-            raise InputError(
-                f"--set {setting} is not understood; write NAME=VALUE, NAME one of {', '.join(known)}"
-            )
-        covariate = known[name.strip()]
-        value = covariate.parse(text)
-        if not covariate.contains(value):
-            low, high = covariate.range
-            seen = f"{low:g} to {high:g} {covariate.unit}".strip()
-            raise InputError(f"--set {setting} is out of range; the atlas was made from {seen}")
-        values[covariate.name] = value
-    return values
+    return card.read_values("--set", settings)
 
 
 def parse_size(text: str) -> tuple[int, int]:
@@ -132,6 +117,6 @@ def parse_size(text: str) -> tuple[int, int]:
     """
     parts = re.fullmatch(r"([0-9]{3,5})x([0-9]{3,5})", text.lower())
     width, height = map(int, parts.groups()) if parts else (0, 0)
-    if width < 640 or height < 480:
-        raise InputError(f"--size {text} is not understood; write WIDTHxHEIGHT, at least 640x480")
+    if not (640 <= width <= 7680 and 480 <= height <= 4320):
+        raise InputError(f"--size {text} is not understood; write WIDTHxHEIGHT, from 640x480 to 7680x4320")
     return width, height

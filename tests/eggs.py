@@ -8,12 +8,17 @@ from pathlib import Path
 import nibabel
 import nrrd
 import numpy as np
+import torch
 import trimesh
 from numpy.typing import ArrayLike, NDArray
 
+from naisr_model.checkpoint import Checkpoint
 from naisr_model.config import Preset, SirenConfig
+from naisr_model.covariates import Covariate, Population
+from naisr_model.data.align import Alignment
+from naisr_model.frames import Frame
 from naisr_model.models.deepsdf import DeepSdfConfig
-from naisr_model.models.factory import preset
+from naisr_model.models.factory import build, preset
 from naisr_model.models.naisr.network import NaisrConfig
 
 RAS = np.diag([-1.0, -1.0, 1.0, 1.0])
@@ -88,3 +93,27 @@ def label_volume(path: Path) -> Path:
             path
         )
     return path
+
+
+def untrained(model: str = "naisr") -> Checkpoint:
+    """An atlas of six eggs with networks as they were drawn: a small good file to make a bad one of."""
+    age = Covariate("age", "years", "continuous", 5.0, 2.5, (1.0, 9.0))
+    sex = Covariate("sex", "", "binary", 0.0, 1.0, (-1.0, 1.0), ("F", "M"))
+    values = np.array([[1.0, -1], [3, 1], [5, -1], [7, 1], [9, -1], [4, 1]])
+    held_out = np.arange(6) == 5
+    population = Population((age, sex), tuple("abcdef"), ("1",) * 6, values, held_out)
+    chosen = {"naisr": egg_preset, "deepsdf": egg_deepsdf_preset}[model](epochs=1)
+    with torch.random.fork_rng():
+        torch.manual_seed(0)
+        weights = build(chosen, 2).state_dict()
+    return Checkpoint(
+        name="eggs",
+        preset=chosen,
+        weights=weights,
+        latents=np.zeros((5, chosen.network.latent), np.float32),
+        population=population,
+        frame=Frame((0.0, 0.0, 0.0), 40.0),
+        alignment=Alignment(),
+        source={},
+        training={"iterations": 3, "seconds": 1.0},
+    )

@@ -19,16 +19,8 @@ FLOORS = {
     "naisr_model": (
         ("__init__",),
         (
-            "errors",
-            "files",
-            "exports",
-            "shipped",
-            "covariates",
-            "frames",
-            "config",
-            "numerals",
-            "progress",
-            "capabilities",
+            *("errors", "files", "exports", "shipped", "records", "covariates", "numerals"),
+            *("frames", "config", "progress", "capabilities"),
         ),
         ("work",),
         ("data",),

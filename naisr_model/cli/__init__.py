@@ -11,6 +11,7 @@ from cyclopts import App, CycloptsError, Parameter
 
 from naisr_model import __version__
 from naisr_model.cli import atlases, benchmarking, data, patients
+from naisr_model.cli.options import converted
 from naisr_model.errors import Cancelled, InputError
 
 COMMANDS = (
@@ -29,7 +30,7 @@ app = App(
     name="naisr",
     version=__version__,
     help="Shape atlases that explain: prepare data, train, inspect, evaluate and export.",
-    default_parameter=Parameter(negative=()),
+    default_parameter=Parameter(negative=(), converter=converted),
 )
 for _command in COMMANDS:
     app.command(_command)
@@ -66,6 +67,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     except OSError as error:
         print(f"naisr: {error.strerror or error}: {error.filename or ''}", file=sys.stderr)
+        return 2
+    except MemoryError:
+        print(
+            "naisr: this machine's memory does not suffice; ask for less, as a lower resolution",
+            file=sys.stderr,
+        )
         return 2
     except (Cancelled, KeyboardInterrupt):
         print("naisr: stopped; what was finished is kept", file=sys.stderr)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from naisr_model.cli.options import AtlasFile, covariate_values
+from naisr_model.cli.options import AtlasFile, FileToWrite
 from naisr_model.errors import InputError
 from naisr_model.files import replacing
 
@@ -58,7 +59,8 @@ def info(atlas: AtlasFile) -> None:
     print(f"box: {2 * checkpoint.frame.scale_mm:.0f} mm wide, alignment by {checkpoint.alignment.method}")
     if checkpoint.source:
         print(f"source: {', '.join(f'{key} {value}' for key, value in checkpoint.source.items())}")
-    told = [say(checkpoint.training[key]) for key, say in TRAINED.items() if key in checkpoint.training]
+    measured = {key: value for key, value in checkpoint.training.items() if math.isfinite(value)}
+    told = [say(measured[key]) for key, say in TRAINED.items() if key in measured]
     print(f"training: {', '.join(told)}")
 
 
@@ -79,7 +81,7 @@ def _extent(covariate: Covariate) -> str:
 
 def mesh(
     atlas: Path,
-    out: Path,
+    out: FileToWrite,
     *,
     set: Annotated[list[str] | None, Parameter(name="--set")] = None,
     effect: str | None = None,
@@ -103,7 +105,7 @@ def mesh(
         device: where the networks are evaluated: cpu, cuda or mps.
     """
     from naisr_model.atlas import Atlas
-    from naisr_model.covariates import require_known
+    from naisr_model.covariates import read_values, require_known
     from naisr_model.exports import FORMATS, mesh_bytes
 
     ending = next((each for each in FORMATS if out.suffix.lower() == f".{each}"), None)
@@ -114,7 +116,7 @@ def mesh(
     loaded = Atlas.load(atlas, device)
     if set and not loaded.covariates:
         raise InputError(f"shapes of {loaded.model_title} depend on no covariates; leave out --set")
-    values = covariate_values(set or [], loaded.covariates)
+    values = read_values("--set", set or [], loaded.covariates)
     if template:
         if not loaded.capabilities.has_template:
             raise InputError(f"{loaded.model_title} has no template; leave out --template")
@@ -129,7 +131,8 @@ def mesh(
     else:
         surface = loaded.shape(values, None, resolution, extrapolate=extrapolate)
     if not len(surface.faces):
-        raise InputError("there is no surface at these covariates; choose values nearer to the data")
+        nearer = "train the atlas for longer" if not values else "choose values nearer to the data"
+        raise InputError(f"the atlas has no surface there; {nearer}")
     with replacing(out) as temporary:
         temporary.write_bytes(mesh_bytes(surface, ending))
     print(f"{out}: {len(surface.faces)} faces, {surface.volume / 1000:.2f} cm³")

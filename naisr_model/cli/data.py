@@ -8,6 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from naisr_model.cli.console import bar
+from naisr_model.cli.options import FolderToWrite
 from naisr_model.data.populations import POPULATIONS, population
 from naisr_model.data.remarks import gravest_first
 from naisr_model.errors import InputError
@@ -15,7 +16,7 @@ from naisr_model.errors import InputError
 PopulationName = Annotated[str, Parameter(help=f"{' or '.join(POPULATIONS)}.")]
 
 
-def populate(name: PopulationName, out: Path, *, patients: int | None = None, seed: int = 0) -> None:
+def populate(name: PopulationName, out: FolderToWrite, *, patients: int | None = None, seed: int = 0) -> None:
     """Write a synthetic population (meshes, landmarks, CSV) as a hospital would hand it over.
 
     Args:
@@ -33,7 +34,7 @@ def populate(name: PopulationName, out: Path, *, patients: int | None = None, se
 def prepare(
     table: Path,
     *,
-    out: Path | None = None,
+    out: FolderToWrite | None = None,
     check: bool = False,
     surface_samples: int = 100_000,
     near_samples: int = 400_000,

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import App, Parameter
 
 from naisr_model.cli.console import bar, write_json
-from naisr_model.cli.options import JsonFile
+from naisr_model.cli.options import FileToWrite, JsonFile
 from naisr_model.errors import InputError
 from naisr_model.evaluation.studies import STUDIES
 from naisr_model.evaluation.study import Study, run
 
 JournalFile = Annotated[
-    Path | None,
+    FileToWrite | None,
     Parameter(help="keep what is measured in this file, so that the same command goes on where it was."),
 ]
 Workers = Annotated[

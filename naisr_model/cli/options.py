@@ -3,49 +3,55 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+import re
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated, Any
 
-from cyclopts import Parameter
+from cyclopts import CoercionError, Parameter, convert
 
 from naisr_model.errors import InputError
 
-if TYPE_CHECKING:
-    from naisr_model.covariates import Covariate  # loads numpy, which '--help' does not need
-
 AtlasFile = Annotated[Path, Parameter(help="the .safetensors file.")]
-JsonFile = Annotated[Path | None, Parameter(name="--json", help="also write the figures to this file.")]
+WHOLE = r"[+-]?[0-9]{1,18}"
+DECIMAL = r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})?"
 
 
-def pairs(option: str, text: str) -> dict[str, str]:
-    """``age=84,sex=M`` as names and texts.
-
-    Raises:
-        InputError: when a part has no ``=``.
-    """
-    parts = [part.partition("=") for part in text.split(",") if part.strip()]
-    if wrong := [name for name, equals, _ in parts if not equals]:
-        raise InputError(f"'{wrong[0]}' after {option} is not understood; write NAME=VALUE,NAME=VALUE")
-    return {name.strip(): value for name, _, value in parts}
-
-
-def covariate_values(settings: Iterable[str], covariates: Iterable[Covariate]) -> dict[str, float]:
-    """What ``--set age=120 --set sex=M`` says, in the units of the covariates.
+def converted(kind: Any, tokens: Sequence[Any]) -> Any:
+    """The words after an option as a value: where a whole number is wanted, 12.5 is none.
 
     Raises:
-        InputError: for another form, a name that is not among ``covariates`` or a value it cannot take.
+        CoercionError: for what is of another kind.
     """
-    known = {covariate.name: covariate for covariate in covariates}
-    values = {}
-    for setting in settings:
-        name, equals, text = setting.partition("=")
-        if not equals or name not in known:
-            raise InputError(
-                f"'--set {setting}' is not understood; write NAME=VALUE with one of {', '.join(known)}"
-            )
-        values[name] = known[name].parse(text)
-    return values
+    return convert(kind, tokens, converter=_converted)
+
+
+def _converted(kind: Any, word: str) -> Any:
+    if kind is int and not re.fullmatch(WHOLE, word):
+        raise CoercionError(msg=f"'{word}' is no whole number; write digits only, as 128")
+    if kind is float and not (re.fullmatch(DECIMAL, word) and math.isfinite(float(word))):
+        raise CoercionError(msg=f"'{word}' is no finite number; write it as 12.5")
+    return convert(kind, [word])
+
+
+def _require_file(_kind: Any, path: Path | None) -> None:
+    """Refuse a folder before hours of work have nowhere to go."""
+    if path is not None and (path.is_dir() or not path.name):
+        raise ValueError("It is a folder; give the name of a file to write")
+
+
+def _require_folder(_kind: Any, path: Path | None) -> None:
+    """The same where a folder is wanted."""
+    if path is not None and path.exists() and not path.is_dir():
+        raise ValueError("It is a file; give the name of a folder to write into")
+
+
+FileToWrite = Annotated[Path, Parameter(validator=_require_file)]
+FolderToWrite = Annotated[Path, Parameter(validator=_require_folder)]
+JsonFile = Annotated[
+    Path | None,
+    Parameter(name="--json", help="also write the figures to this file.", validator=_require_file),
+]
 
 
 def seconds(text: str) -> float:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from naisr_model.cli.console import bar, stoppable, write_json
-from naisr_model.cli.options import AtlasFile, JsonFile, pairs
+from naisr_model.cli.options import AtlasFile, FolderToWrite, JsonFile
 from naisr_model.errors import InputError
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def fit(
     atlas: AtlasFile,
     reading: IntakeOptions = _AS_IT_IS,
     out: Annotated[
-        Path | None, Parameter(help="folder for the fitted surface, a table and a picture.")
+        FolderToWrite | None, Parameter(help="folder for the fitted surface, a table and a picture.")
     ] = None,
     json_file: JsonFile = None,
 ) -> None:
@@ -79,15 +79,19 @@ def transfer(
         ),
     ],
     reading: IntakeOptions = _AS_IT_IS,
-    out: Annotated[Path | None, Parameter(help="folder for both surfaces, a table and a picture.")] = None,
+    out: Annotated[
+        FolderToWrite | None, Parameter(help="folder for both surfaces, a table and a picture.")
+    ] = None,
     json_file: JsonFile = None,
 ) -> None:
     """Show a patient's shape at other covariates, as it is expected on another day."""
-    from naisr_model.patients.evolution import parsed
+    from naisr_model.covariates import read_values
 
-    fitted, intake = _fitted(patient, _transferable(atlas), reading)
-    moved = fitted.at(parsed(fitted.individual.atlas, pairs("--to", to)))
-    _tell_series(fitted, intake, [fitted.individual, moved], out, json_file)
+    loaded = _transferable(atlas)
+    wanted = read_values("--to", [to], loaded.covariates)
+    loaded.complete(wanted)  # refused before the fit
+    fitted, intake = _fitted(patient, loaded, reading)
+    _tell_series(fitted, intake, [fitted.individual, fitted.at(wanted)], out, json_file)
 
 
 def evolve(
@@ -110,14 +114,18 @@ def evolve(
             "or a CSV whose header names covariates, a row for each step."
         ),
     ] = "population",
-    out: Annotated[Path | None, Parameter(help="folder for the surfaces, a table and a picture.")] = None,
+    out: Annotated[
+        FolderToWrite | None, Parameter(help="folder for the surfaces, a table and a picture.")
+    ] = None,
     json_file: JsonFile = None,
 ) -> None:
     """Follow a patient's shape along one covariate."""
-    from naisr_model.patients.evolution import evolution
+    from naisr_model.patients.evolution import evolution, require_way
 
-    fitted, intake = _fitted(patient, _transferable(atlas), reading)
-    _tell_series(fitted, intake, evolution(fitted, along, start, stop, steps, path), out, json_file)
+    loaded, way = _transferable(atlas), (along, start, stop, steps, path)
+    require_way(loaded, *way)  # refused before the fit
+    fitted, intake = _fitted(patient, loaded, reading)
+    _tell_series(fitted, intake, evolution(fitted, *way), out, json_file)
 
 
 def _loaded(atlas: Path) -> Any:
@@ -139,11 +147,12 @@ def _transferable(atlas: Path) -> Any:
 
 def _fitted(patient: Path, loaded: Any, reading: IntakeOptions) -> tuple[Any, Any]:
     """The fit, and how the file was brought into the frame of the atlas."""
-    from naisr_model.patients.evolution import parsed
+    from naisr_model.covariates import read_values
     from naisr_model.patients.intake import take_in
 
     options = dataclasses.asdict(reading)
-    known = parsed(loaded, pairs("--known", options.pop("known")))
+    told = options.pop("known")
+    known = read_values("--known", [told] if told else [], loaded.covariates)
     loaded.complete(known)  # refused before a scan is read and repaired
     with stoppable() as progress:
         intake = take_in(patient, loaded, known, **options, progress=progress)

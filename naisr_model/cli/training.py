@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from naisr_model.cli.console import training_bar
-from naisr_model.cli.options import seconds
+from naisr_model.cli.options import FileToWrite, seconds
 from naisr_model.config import Preset, read_toml
 from naisr_model.data.store import SampleStore
 from naisr_model.learning.training.loop import train as run_training
@@ -30,7 +30,7 @@ def _told(known: Mapping[str, Preset]) -> str:
 def train(
     store: Path,
     *,
-    out: Path,
+    out: FileToWrite,
     preset: Annotated[str, Parameter(help=_told(presets()))] = "demo",
     config: Path | None = None,
     epochs: int | None = None,

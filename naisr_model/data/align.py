@@ -10,7 +10,7 @@ import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal, cast, get_args
 
 import igl
 import numpy as np
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
+from naisr_model import records
 from naisr_model.data.markups import Space, read_markups
 from naisr_model.data.meshes import rim
 from naisr_model.errors import InputError
@@ -76,10 +77,22 @@ class Alignment:
         return {"method": self.method, "origin": self.origin, "reference": reference}
 
     @classmethod
-    def from_json(cls, record: Mapping[str, Any]) -> Alignment:
-        """The inverse of :meth:`to_json`."""
-        reference = {str(name): _point(point) for name, point in record["reference"].items()}
-        return cls(record["method"], str(record["origin"]), reference)
+    def from_json(cls, record: dict[str, Any]) -> Alignment:
+        """The inverse of :meth:`to_json`.
+
+        Raises:
+            ValueError: for what that never gives.
+        """
+        places = records.entry(record, "reference", dict)
+        reference = {name: _point(records.numbers(places, name, 3)) for name in places}
+        method, origin = records.entry(record, "method", str), records.entry(record, "origin", str)
+        if method not in METHODS:
+            raise ValueError(f"the alignment is by '{method}'")
+        if len(reference) < {"none": 0, "landmarks": 1, "icp": 3}[method]:
+            raise ValueError(f"the alignment by {method} has {len(reference)} points of reference")
+        if method == "landmarks" and origin and origin not in reference:
+            raise ValueError(f"the alignment has no landmark '{origin}', its origin")
+        return cls(cast(Method, method), origin, reference)
 
 
 def _point(values: Sequence[float] | NDArray[np.float64]) -> tuple[float, float, float]:

@@ -45,6 +45,10 @@ REPORT = "report.json"
 _OWN_NAME = re.compile(r"[0-9a-f]{24}|\.[0-9a-f]{24}\.\d+\.tmp")
 
 
+MOST_SAMPLES = 10_000_000
+"""Of a kind and a shape: 240 MB."""
+
+
 @dataclass(frozen=True)
 class PrepareOptions:
     """How many samples to take of each shape, and who is held out.
@@ -125,10 +129,13 @@ def prepare(
 def _checked_table(csv: str | Path, options: PrepareOptions) -> ShapeTable:
     if not 0 <= options.held_out < 1:
         raise InputError(f"the held-out share is {options.held_out:g}; give a number from 0 to below 1")
-    if min(options.surface_samples, options.near_samples, options.uniform_samples) < 1:
-        raise InputError("the numbers of samples must be at least 1")
-    if options.seed < 0:
-        raise InputError(f"the seed is {options.seed}; give 0 or more")
+    for kind in store.KINDS:
+        if not 1 <= (count := getattr(options, f"{kind}_samples")) <= MOST_SAMPLES:
+            raise InputError(
+                f"{count} {kind} samples a shape were asked for; give at least 1, at most {MOST_SAMPLES}"
+            )
+    if not 0 <= options.seed < 2**32:
+        raise InputError(f"the seed is {options.seed}; give 0 or more, up to {2**32 - 1}")
     table = tables.read_table(csv)
     if any(row.mesh == Path(csv).parent for row in table.rows):
         raise InputError(f"{Path(csv).name} has no column 'mesh'; add one with the path of each mesh")

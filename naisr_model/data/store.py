@@ -17,6 +17,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from naisr_model import records
 from naisr_model.covariates import Population
 from naisr_model.data.align import Alignment
 from naisr_model.errors import InputError
@@ -28,6 +29,9 @@ INDEX = "store.json"
 SHAPES = "shapes"
 KINDS = ("surface", "near", "uniform")
 MESH = "mesh.ply"
+
+FARTHEST = 1e6
+"""Model units beyond which a sample is damage; the box is 2 wide."""
 
 
 class Draw(NamedTuple):
@@ -95,24 +99,19 @@ class SampleStore:
         try:
             store = cls(
                 path=path,
-                name=str(record["name"]),
-                population=Population.from_json(record["population"]),
-                frame=Frame.from_json(record["frame"]),
-                alignment=Alignment.from_json(record["alignment"]),
-                source=dict(record["source"]),
-                options=dict(record["options"]),
-                folders=tuple(map(str, record["shapes"])),
+                name=records.entry(record, "name", str),
+                population=Population.from_json(records.entry(record, "population", dict)),
+                frame=Frame.from_json(records.entry(record, "frame", dict)),
+                alignment=Alignment.from_json(records.entry(record, "alignment", dict)),
+                source=records.scalars(record, "source"),
+                options=_options(record),
+                folders=_folders(record),
                 blocks={},
             )
-        except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
-            raise _damaged(path / INDEX, repr(error)) from error
-        people = store.population
-        rows = {
-            len(store.folders),
-            *map(len, (people.subjects, people.visits, people.values, people.held_out)),
-        }
-        if len(rows) != 1:
-            raise _damaged(path / INDEX, "its columns differ in length")
+            if len(store.folders) != len(store.population):
+                raise ValueError(f"{len(store.folders)} shapes of {len(store.population)} visits")
+        except (TypeError, ValueError) as error:
+            raise _damaged(path / INDEX, str(error)) from error
         return store
 
     def __len__(self) -> int:
@@ -159,12 +158,18 @@ class SampleStore:
         offset = block.offset + start * block.columns * 4
         try:
             flat = np.fromfile(block.path, np.float32, count * block.columns, offset=offset)
-            return flat.reshape(count, block.columns)
+            drawn = flat.reshape(count, block.columns)
         except (OSError, ValueError) as error:
             raise _damaged(block.path, str(error)) from error
+        if not (np.abs(drawn) <= FARTHEST).all():
+            raise _damaged(block.path, "it holds what is no number or far outside of the box")
+        return drawn
 
     def _open_block(self, row: int, kind: str) -> _Block:
-        block = self.blocks[row, kind] = _find_block(self.folder(row) / f"{kind}.npy", kind, self.frame.dim)
+        block = _find_block(self.folder(row) / f"{kind}.npy", kind, self.frame.dim)
+        if block.rows != (expected := self.options.get(f"{kind}_samples", block.rows)):
+            raise _damaged(block.path, f"{block.rows} samples where {expected} are expected")
+        self.blocks[row, kind] = block
         return block
 
 
@@ -172,7 +177,7 @@ def _find_block(path: Path, kind: str, dim: int) -> _Block:
     try:
         array = np.lib.format.open_memmap(path, mode="r")
         rows, columns = map(int, array.shape)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError, MemoryError) as error:
         raise _damaged(path, str(error)) from error
     expected = 2 * dim if kind == "surface" else dim + 1
     if array.dtype != np.float32 or columns != expected or not array.flags.c_contiguous:
@@ -188,13 +193,19 @@ def _read_mesh(path: Path) -> trimesh.Trimesh:
 
 
 def is_whole(folder: Path, counts: Mapping[str, int], dim: int) -> bool:
-    """Whether a shape's folder holds its mesh and so many samples of each kind in ``dim`` dimensions."""
+    """Whether a shape's folder holds its mesh and so many samples of each kind, in ``dim`` dimensions."""
     try:
         blocks = {kind: _find_block(folder / f"{kind}.npy", kind, dim) for kind in counts}
         _read_mesh(folder / MESH)
     except InputError:
         return False
-    return all(blocks[kind].rows == count for kind, count in counts.items())
+    return all(blocks[kind].rows == count and _are_sound(blocks[kind]) for kind, count in counts.items())
+
+
+def _are_sound(block: _Block) -> bool:
+    """Whether all samples of a file are numbers that can be of a shape in the box."""
+    samples = np.fromfile(block.path, np.float32, block.rows * block.columns, offset=block.offset)
+    return len(samples) == block.rows * block.columns and bool((np.abs(samples) <= FARTHEST).all())
 
 
 def _damaged(path: Path, what: str) -> InputError:
@@ -205,13 +216,32 @@ def _read_index(path: Path) -> dict[str, Any]:
     if not path.is_file():
         raise InputError(f"{path.parent} is not a finished sample store; run 'naisr prepare' first")
     try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-        version = int(record["version"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise _damaged(path, repr(error)) from error
+        record = records.parsed(path.read_text(encoding="utf-8"))
+        version = records.entry(record, "version", int)
+    except (OSError, ValueError) as error:
+        raise _damaged(path, str(error)) from error
     if version > VERSION:
         raise InputError(f"{path} was written by a newer version of this program; update the program")
-    return dict(record)
+    if version < 1:
+        raise _damaged(path, f"it is of the unknown version {version}")
+    return record
+
+
+def _options(record: dict[str, Any]) -> dict[str, Any]:
+    """Settings of the preparation, counts of samples among them."""
+    options = records.scalars(record, "options")
+    for kind in KINDS:
+        if f"{kind}_samples" in options and records.entry(options, f"{kind}_samples", int) < 1:
+            raise ValueError(f"'{kind}_samples' is below 1")
+    return options
+
+
+def _folders(record: dict[str, Any]) -> tuple[str, ...]:
+    """Names of the shapes' folders, which lie in the store."""
+    names = records.texts(record, "shapes")
+    if strangers := [name for name in names if Path(name).name != name or name in ("", ".", "..")]:
+        raise ValueError(f"the folder '{strangers[0][:60]}' of a shape is none of the store")
+    return names
 
 
 def write_index(

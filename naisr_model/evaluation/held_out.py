@@ -105,6 +105,12 @@ def require_shapes(atlas: Atlas, store: Path | None, limit: int = 0) -> None:
         raise InputError(
             "this atlas was made from data of your own; give the store it was trained on with --store"
         )
+    elif strangers := [one for one in _held_out_visits(atlas.population) if one not in source_visits(atlas)]:
+        subject, visit = strangers[0]
+        raise InputError(
+            f"subject '{subject}', visit '{visit}' is not in the population that the atlas names; "
+            "give the store it was trained on with --store"
+        )
 
 
 def held_out(atlas: Atlas, store: Path | None, row: int) -> HeldOut:
@@ -149,8 +155,11 @@ def _held_out_visits(population: Population) -> list[tuple[str, str]]:
 def synthetic(atlas: Atlas) -> PopulationModule | None:
     """The population that an atlas records as its source and that can be made again."""
     source = atlas.checkpoint.source
-    known = source.get("population") in populations.POPULATIONS and {"seed", "patients"} <= set(source)
-    return populations.population(str(source["population"])) if known else None
+    name, seed, patients = (source.get(key) for key in ("population", "seed", "patients"))
+    if name not in populations.POPULATIONS or not isinstance(seed, int) or not isinstance(patients, int):
+        return None
+    is_possible = seed >= 0 and 1 <= patients <= populations.MOST_PATIENTS
+    return populations.population(str(name)) if is_possible else None
 
 
 def known_population(atlas: Atlas) -> PopulationModule:

@@ -17,6 +17,7 @@ from typing import Any
 
 from filelock import FileLock, Timeout
 
+from naisr_model import records
 from naisr_model.errors import InputError
 
 Record = dict[str, Any]
@@ -105,12 +106,9 @@ def _complete_lines(path: Path, identity: Record) -> list[bytes]:
 
 def _parsed(path: Path, line: bytes) -> Record:
     try:
-        value = json.loads(line)
+        return records.parsed(line.decode())
     except ValueError as error:
         raise _no_journal(path) from error
-    if not isinstance(value, dict):
-        raise _no_journal(path)
-    return value
 
 
 def _no_journal(path: Path) -> InputError:

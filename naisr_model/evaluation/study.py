@@ -97,7 +97,19 @@ def run(
             _require_unchanged(study, started)
             records[missing[number].key] = plain(record)
             keep(missing[number].key, record)
-    return study.summarise([records[case.key] for case in cases])
+        return _summarised(study, [records[case.key] for case in cases], journal if kept else None)
+
+
+def _summarised(study: Study[Any], records: Sequence[Record], journal: Path | None) -> Record:
+    """The report; where some of the records were read from a journal, they may be anything."""
+    try:
+        return study.summarise(records)
+    except (AttributeError, IndexError, KeyError, TypeError) as error:
+        if journal is None:
+            raise
+        raise InputError(
+            f"{journal} keeps what this evaluation never measured ({error!r}); delete it, or name another one"
+        ) from error
 
 
 def identity(study: Study[Any]) -> Record:

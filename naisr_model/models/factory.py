@@ -10,6 +10,8 @@ from importlib import import_module
 from types import MappingProxyType
 from typing import Any, Protocol, cast
 
+import torch
+
 from naisr_model.config import Preset, TrainingConfig, from_json
 from naisr_model.errors import InputError
 from naisr_model.models.base import ShapeModel
@@ -24,6 +26,10 @@ MODELS = MappingProxyType(
 
 UNNAMED = "naisr"
 """The model of a record that names none: it was written when there was no other."""
+
+
+MOST_WEIGHTS = 200_000_000
+"""A hundred times as many as at the paper's size."""
 
 
 class ModelModule(Protocol):
@@ -60,6 +66,26 @@ def build(preset: Preset, covariates: int) -> ShapeModel:
     return model_class(preset.model)(preset.network, covariates)
 
 
+def layout(preset: Preset, covariates: int) -> dict[str, tuple[int, ...]]:
+    """Shapes of a model's weights by name, found without making them.
+
+    Args:
+        preset: names the model and the sizes of its networks.
+        covariates: how many were measured.
+
+    Raises:
+        InputError: for an unknown model, or one of more than :data:`MOST_WEIGHTS`.
+    """
+    with torch.device("meta"):
+        weights = build(preset, covariates).state_dict()
+    if (count := sum(weight.numel() for weight in weights.values())) > MOST_WEIGHTS:
+        raise InputError(
+            f"the networks have {count:.2g} weights, more than {MOST_WEIGHTS:g}; give smaller widths, fewer "
+            "layers or a shorter latent code"
+        )
+    return {name: tuple(weight.shape) for name, weight in weights.items()}
+
+
 def presets() -> dict[str, Preset]:
     """The presets of all models by name.
 
@@ -87,7 +113,7 @@ def preset(name: str) -> Preset:
 
 def model_of(record: Mapping[str, Any]) -> str:
     """Name of the model of a preset's record, known or not."""
-    return str(record.get("model", UNNAMED))
+    return str(record.get("model", UNNAMED))[:60]
 
 
 def read_preset(record: dict[str, Any]) -> Preset:

@@ -14,6 +14,12 @@ from naisr_model.covariates import complete, growth_path, require_known
 from naisr_model.data.sheets import read_sheet, split_title
 from naisr_model.errors import InputError
 
+WAYS = ("population", "only")
+"""From where to where somebody is followed without a table."""
+
+MOST_STEPS = 1000
+"""Shapes of one series; each takes a second or two."""
+
 
 def fit_record(fit: Fit) -> dict[str, Any]:
     """What is told of a fit, for JSON: real units, mm and cm³.
@@ -52,16 +58,35 @@ def evolution(
     Raises:
         InputError: for an unknown covariate, a value out of range, too few steps or an unreadable CSV.
     """
-    if path not in ("population", "only"):
+    atlas = fit.individual.atlas
+    require_way(atlas, along, start, stop, steps, path)
+    if path not in WAYS:
         return along_table(fit, Path(path))
-    known = {covariate.name: covariate for covariate in fit.individual.atlas.covariates}
-    require_known([along], known.values())
-    if steps < 1:
-        raise InputError(f"--steps is {steps}; give at least 1")
     first = fit.covariates[along] if start is None else start
-    last = known[along].range[1] if stop is None else stop
+    last = atlas.covariates[atlas.population.names.index(along)].range[1] if stop is None else stop
     values = np.linspace(first, last, steps)
     return along_population(fit, along, values) if path == "population" else along_only(fit, along, values)
+
+
+def require_way(
+    atlas: Atlas, along: str, start: float | None, stop: float | None, steps: int, path: str
+) -> None:
+    """Make sure that :func:`evolution` can go where it is asked to, whoever the patient is.
+
+    Raises:
+        InputError: for an unknown covariate, a value out of range, too few or too many steps, or an
+            unreadable CSV.
+    """
+    if path not in WAYS:
+        for row in _rows(atlas, Path(path)):
+            atlas.complete(row)
+        return
+    require_known([along], atlas.covariates)
+    if not 1 <= steps <= MOST_STEPS:
+        raise InputError(f"--steps is {steps}; give 1 to {MOST_STEPS}")
+    for end in (start, stop):
+        if end is not None:
+            atlas.complete({along: end})
 
 
 def along_population(fit: Fit, name: str, values: NDArray[np.float64]) -> list[Individual]:
@@ -102,14 +127,23 @@ def along_table(fit: Fit, path: Path) -> list[Individual]:
     Raises:
         InputError: when the file cannot be read, has no row, or holds what is no covariate value.
     """
+    return [fit.at(row) for row in _rows(fit.individual.atlas, path)]
+
+
+def _rows(atlas: Atlas, path: Path) -> list[dict[str, float]]:
+    """Covariate values of each row of a CSV."""
     try:
-        records = read_sheet(path).records()
+        sheet = read_sheet(path).records()
     except InputError as error:
         raise InputError(f"the path {path} cannot be read: {error}") from error
-    rows = [{split_title(title)[0]: cell for title, cell in record.items()} for record in records]
-    if not rows:
+    if not sheet:
         raise InputError(f"the path {path} has no rows; give a header of covariates and a row for each step")
-    return [fit.at(parsed(fit.individual.atlas, row)) for row in rows]
+    if len(sheet) > MOST_STEPS:
+        raise InputError(f"the path {path} has {len(sheet)} rows; give 1 to {MOST_STEPS}")
+    names = [split_title(title)[0] for title in sheet[0]]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise InputError(f"the path {path} has the column '{twice[0]}' twice; leave one of them out")
+    return [parsed(atlas, dict(zip(names, record.values(), strict=True))) for record in sheet]
 
 
 def parsed(atlas: Atlas, texts: dict[str, str]) -> dict[str, float]:
@@ -120,4 +154,4 @@ def parsed(atlas: Atlas, texts: dict[str, str]) -> dict[str, float]:
     """
     known = {covariate.name: covariate for covariate in atlas.covariates}
     require_known(texts, known.values())
-    return {name: known[name].parse(text or "") for name, text in texts.items()}
+    return {name: known[name].parse(text) for name, text in texts.items()}

@@ -100,9 +100,26 @@ class DisplacementTables:
                 )
                 for index in range(len(arrays) // 3)
             )
+            _require_sound(arrays["region"], tables)
             return cls(arrays["region"], tables)
-        except (SafetensorError, OSError, KeyError) as error:
+        except (SafetensorError, OSError, KeyError, IndexError, ValueError) as error:
             raise InputError(f"{path} does not hold tabulated displacements ({error})") from error
+
+
+def _require_sound(region: NDArray[np.float64], tables: tuple[DisplacementTable, ...]) -> None:
+    """Make sure that tables can be interpolated in: whoever does asks no more.
+
+    Raises:
+        ValueError: when they cannot.
+    """
+    if region.shape != (2, 3) or not np.isfinite(region).all():
+        raise ValueError("its region is none")
+    for table in tables:
+        knots, nodes = table.knots, table.nodes
+        if not table.spacing > 0 or knots.ndim != 1 or not (np.diff(knots) > 0).all():
+            raise ValueError("its knots do not rise")
+        if nodes.ndim != 5 or nodes.shape[:2] != (len(knots), 3) or not np.isfinite(nodes).all():
+            raise ValueError("its displacements are none")
 
 
 def tabulate(

@@ -10,6 +10,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
@@ -77,10 +78,14 @@ def processes(workers: int | None = None) -> Iterator[Run]:
     # Nothing is ever sent: its end, by a closed end here or a killed parent, is what tells the workers. An
     # event would wait for the answer of a worker that was killed.
     wanted, wanting = context.Pipe(duplex=False)
-    pool = ProcessPoolExecutor(count, mp_context=context, initializer=_start_worker, initargs=(wanted,))
-    with wanted, wanting:
+    # Here each worker says a word when it has started: one that cannot was not killed for lack of memory.
+    started, starting = context.Pipe(duplex=False)
+    pool = ProcessPoolExecutor(
+        count, mp_context=context, initializer=_start_worker, initargs=(wanted, starting)
+    )
+    with wanted, wanting, started, starting:
         try:
-            yield partial(_run_in, pool)
+            yield partial(_run_in, pool, started)
         except BaseException:
             wanting.close()
             raise
@@ -109,6 +114,7 @@ def _run_here(
 
 def _run_in(
     pool: ProcessPoolExecutor,
+    started: Connection,
     function: Callable[[Job], Result],
     jobs: Sequence[Job],
     progress: Progress = SILENT,
@@ -126,9 +132,18 @@ def _run_in(
             if done:
                 progress.tell(1 - len(pending) / len(jobs))
     except BrokenProcessPool as error:
+        if not started.poll():
+            raise InputError(
+                "no worker process could start: a script that starts some needs its own work to stand under "
+                "if __name__ == '__main__'; write it so, or run with one worker"
+            ) from error
         raise InputError(
             "a worker process died, most likely for lack of memory; run again with fewer workers"
         ) from error
+    except RuntimeError as error:
+        if "__mp_main__" in sys.modules:  # a worker that runs the script it was started by, which will tell
+            raise SystemExit(1) from error
+        raise
 
 
 @contextmanager
@@ -144,11 +159,12 @@ def _held_back() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _start_worker(wanted: Connection) -> None:
+def _start_worker(wanted: Connection, starting: Connection) -> None:
     """One thread a worker, which leaves when its parent does or says so, not at the Ctrl+C of a terminal."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.environ.update(dict.fromkeys(THREADS, "1"))
     threadpool_limits(1)
+    starting.send_bytes(b"!")
     threading.Thread(target=_leave_unwanted, args=(wanted,), daemon=True).start()
 
 

@@ -10,6 +10,7 @@ from threading import Lock
 from typing import TYPE_CHECKING
 
 from naisr_model.errors import Cancelled, InputError
+from naisr_model.files import require_file
 from naisr_viewer.engine.cache import Cache, fingerprint_of
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.requests import SurfaceResult
@@ -77,8 +78,7 @@ class Atlases:
         Raises:
             InputError: when there is no such file or it is not an atlas of surfaces.
         """
-        if not path.is_file():
-            raise InputError(f"there is no file {path}; give the path of an atlas (.safetensors)")
+        require_file(path, "an atlas (.safetensors)")
         fingerprint = fingerprint_of(path)
         if (kept := self._cache.opening(fingerprint, path)) is not None:
             return Opened(kept.card, fingerprint, kept.picture), None

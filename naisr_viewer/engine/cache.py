@@ -56,7 +56,8 @@ def fingerprint_of(path: Path) -> str:
         InputError: when the file cannot be read.
     """
     try:
-        contents = path.read_bytes()
+        with path.open("rb") as file:  # piece by piece: anything may have been opened, however large
+            contents = hashlib.file_digest(file, "sha256").digest()
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror}; give the path of an atlas") from error
     return hashlib.sha256(program_digest() + contents).hexdigest()[:32]
@@ -154,6 +155,20 @@ def _write_opening(file: Path, opening: Opening) -> None:
     )
 
 
+def _require_surface(picture: SurfaceResult) -> None:
+    """Make sure that a surface can be drawn: whoever draws it asks no more.
+
+    Raises:
+        ValueError: when it is none.
+    """
+    points, normals, faces = picture.points_mm, picture.normals, picture.faces
+    arrays = [array.ndim == 2 and array.shape[1] == 3 for array in (points, normals, faces)]
+    if not all(arrays) or len(points) != len(normals) or not np.isfinite(points).all():
+        raise ValueError("its points are none")
+    if faces.size and not 0 <= faces.min() <= faces.max() < len(points):
+        raise ValueError("its faces are of other points")
+
+
 def _read_opening(file: Path, atlas: Path) -> Opening:
     """What :func:`_write_opening` kept; the archive's checksums find out what was damaged since.
 
@@ -175,6 +190,7 @@ def _read_opening(file: Path, atlas: Path) -> Opening:
                 seconds=float(record["seconds"]),
                 origin=Origin.NETWORK,
             )
+        _require_surface(picture)
     except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile, zlib.error) as error:
         raise InputError(f"{file} does not hold the opening of an atlas ({error})") from error
     return Opening(card, picture)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from naisr_model.capabilities import Capabilities
-from naisr_model.covariates import Covariate, Population
+from naisr_model.covariates import Covariate, Population, complete, read_values
 
 RealVector = tuple[float, ...]
 """Real covariate values in the atlas's covariate order."""
@@ -34,6 +35,16 @@ class AtlasCard:
     def centre(self) -> RealVector:
         """The population mean, where every slider starts."""
         return tuple(covariate.centre for covariate in self.covariates)
+
+    def read_values(self, option: str, settings: Sequence[str]) -> dict[str, float]:
+        """Real values by name from ``["age=120", "sex=M"]``, which stand behind ``option``.
+
+        Raises:
+            InputError: for an unknown covariate, no number, or a value outside the observed range.
+        """
+        values = read_values(option, settings, self.covariates)
+        complete(self.covariates, values)
+        return values
 
     def index(self, name: str) -> int:
         """Position of a covariate; ``ValueError`` for an unknown name."""

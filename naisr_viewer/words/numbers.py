@@ -9,9 +9,8 @@ from naisr_model.errors import InputError
 
 
 def decimals(covariate: Covariate) -> int:
-    """Digits after the point that tell about a thousand steps of the range apart."""
-    low, high = covariate.range
-    return max(0, min(6, 2 - math.floor(math.log10(max(high - low, 1e-6)))))
+    """Digits after the point that a number box has; the range counts as far as they tell it."""
+    return covariate.decimals
 
 
 def reading(covariate: Covariate, value: float) -> str:

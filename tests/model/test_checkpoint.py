@@ -59,7 +59,7 @@ def test_an_unknown_model_is_named(egg_atlas, tmp_path):
 
 
 def test_a_missing_file_is_named(tmp_path):
-    with pytest.raises(InputError, match=r"no atlas at .*nowhere"):
+    with pytest.raises(InputError, match=r"no file .*nowhere.*give the path of an atlas"):
         load(tmp_path / "nowhere.safetensors")
 
 

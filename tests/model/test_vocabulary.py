@@ -1,12 +1,14 @@
 """Frames, covariates and settings."""
 
 import dataclasses
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
 
-from naisr_model.config import read_toml, to_json
-from naisr_model.covariates import Covariate, Population, complete
+from naisr_model.config import read_toml, require_ranges, to_json
+from naisr_model.covariates import Covariate, Population, complete, read_values
 from naisr_model.errors import InputError
 from naisr_model.files import replacing
 from naisr_model.frames import Frame, enclosing_frame
@@ -40,7 +42,7 @@ def test_a_covariate_reads_what_people_write():
 
 def test_missing_covariates_are_at_the_centre_and_others_are_checked():
     assert complete((AGE, SEX), {"age": 12}) == {"age": 12.0, "sex": 0.0}
-    with pytest.raises(InputError, match=r"412 months.*1 to 233; give a value within that"):
+    with pytest.raises(InputError, match=r"412 months.*1 to 233 months; give a value within that"):
         complete((AGE, SEX), {"age": 412})
     assert complete((AGE, SEX), {"age": 412}, extrapolate=True)["age"] == 412
     with pytest.raises(InputError, match="unknown covariate 'height'"):
@@ -52,6 +54,107 @@ def test_missing_covariates_are_at_the_centre_and_others_are_checked():
 def test_in_range_is_said_once():
     assert AGE.contains(1.0) and AGE.contains(233.0 + 1e-12) and not AGE.contains(234.0)
     assert not AGE.contains(float("nan"))
+
+
+@pytest.mark.parametrize(
+    ("low", "high"),
+    [
+        (2.5837, 91.4656),
+        (1.0, 232.693),
+        (0.3243984, 99.931519),
+        (-0.004444, 0.0123456),
+        (0.0, 1e-3),
+        (1012.6, 98765.4),
+    ],
+)
+def test_every_end_of_the_range_that_is_told_is_accepted(low, high):
+    covariate = Covariate("weight", "kg", "continuous", (low + high) / 2, 1.0, (low, high))
+    for end in (low, high):
+        for told in (covariate.format(end).split()[0], f"{end:g}", f"{end:.{covariate.decimals}f}"):
+            assert complete((covariate,), {"weight": covariate.parse(told)})["weight"] == float(told)
+    extent = high - low
+    for beyond in (low - 0.01 * extent, high + 0.01 * extent):
+        with pytest.raises(InputError, match="the atlas was trained on"):
+            complete((covariate,), {"weight": beyond})
+
+
+COMMA = Covariate("BMI, percentile = low", "%", "continuous", 50.0, 20.0, (1.0, 99.0))
+
+
+@pytest.mark.parametrize(
+    ("texts", "values"),
+    [
+        (["age=120", " sex = M"], {"age": 120.0, "sex": 1.0}),
+        (["age=120, sex=F,"], {"age": 120.0, "sex": -1.0}),
+        (["age=12,BMI, percentile = low=50,sex=M"], {"age": 12.0, COMMA.name: 50.0, "sex": 1.0}),
+    ],
+)
+def test_settings_are_read_in_real_units(texts, values):
+    assert read_values("--set", texts, (AGE, SEX, COMMA)) == values
+
+
+@pytest.mark.parametrize(
+    ("texts", "message"),
+    [
+        (["age=1", "age=2"], "'age' is given twice after --known; give it once"),
+        (["age=1,sex=M,age=1"], "'age' is given twice"),
+        (["age"], "'age' after --known is not understood; write NAME=VALUE"),
+        (["age=12,5"], "'5' after --known is not understood"),
+        (["tall,age=12"], "'tall' after --known is not understood"),
+        ([""], "'' after --known is not understood"),
+        (["=3"], "unknown covariate ''"),
+        (["height=3"], "unknown covariate 'height' after --known; write NAME=VALUE with one of age, sex"),
+        (["age=1_0"], "'age' is '1_0'; expected a number in months"),
+        (["age=1e40"], "expected a number in months"),
+        (["age=nan"], "expected a number in months"),
+        (["sex=m"], "expected F or M"),
+    ],
+)
+def test_what_is_no_setting_is_told(texts, message):
+    with pytest.raises(InputError, match=message):
+        read_values("--known", texts, (AGE, SEX))
+
+
+def test_settings_where_there_is_nothing_to_set():
+    with pytest.raises(InputError, match="'age'; its shapes depend on no covariates"):
+        read_values("--known", ["age=3"], ())
+
+
+def numbers_of(config: Any, where: str = "") -> Iterator[tuple[str, Any]]:
+    """Every number among some settings, with its name."""
+    for item in dataclasses.fields(config):
+        value = getattr(config, item.name)
+        if dataclasses.is_dataclass(value):
+            yield from numbers_of(value, f"{where}{item.name}.")
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            yield f"{where}{item.name}", value
+
+
+def changed(config: Any, where: str, value: Any) -> Any:
+    first, _, rest = where.partition(".")
+    inner = changed(getattr(config, first), rest, value) if rest else value
+    return dataclasses.replace(config, **{first: inner})
+
+
+@pytest.mark.parametrize("name", ["demo", "deepsdf-demo"])
+def test_every_number_among_the_settings_has_a_range(name):
+    chosen = preset(name)
+    require_ranges(chosen)
+    for where, value in numbers_of(chosen):
+        for wrong in (-1, float("nan"), float("inf"), 10**400):
+            with pytest.raises(InputError, match=rf"the setting '{where}' is .*; give .* to"):
+                require_ranges(changed(chosen, where, wrong))
+        assert value >= 0
+
+
+def test_ranges_hold_in_lists_and_say_what_they_take():
+    with pytest.raises(InputError, match=r"'training.epochs' is 2.5; give a whole number from 1 to 1000000"):
+        require_ranges(changed(preset("demo"), "training.epochs", 2.5))
+    wrong = changed(preset("demo"), "training.template_epochs", (5, 0))
+    with pytest.raises(InputError, match=r"'training.template_epochs' is 0; give 1 to 1000000"):
+        require_ranges(wrong)
+    with pytest.raises(InputError, match=r"'training.seed' is 4294967296; give 0 to 4294967295"):
+        require_ranges(changed(preset("demo"), "training.seed", 2**32))
 
 
 @pytest.fixture
@@ -118,6 +221,11 @@ def test_settings_from_a_file_change_only_what_they_name(tmp_path):
         ("[training]\nepoch = 7\n", "unknown setting 'training.epoch'"),
         ("[training]\nepochs = 'many'\n", "'training.epochs' is 'many'; expected int"),
         ("training = 3\n", "'training' is 3; expected a table"),
+        ("[training]\nlatent_rate = nan\n", "'training.latent_rate' is nan; give 1e-09 to 1000"),
+        ("[training]\ntemplate_rate = 1" + 400 * "0" + "\n", "'training.template_rate' is inf"),
+        ("[network]\nlatent = 0\n", "'network.latent' is 0; give 1 to 4096"),
+        ("[network.template]\nwidth = -3\n", "'network.template.width' is -3; give 1 to 4096"),
+        ("training = " + 3000 * "[", "cannot read the settings"),
         ("[training]\ntemplate_epochs = 5\n", "'training.template_epochs' is 5; expected a list of int"),
         ("[training]\ntemplate_epochs = '12'\n", "'training.template_epochs' is '12'; expected a list"),
         ("[training]\ntemplate_epochs = ['a']\n", "'training.template_epochs' is 'a'; expected int"),

@@ -55,6 +55,8 @@ def test_settings_are_read_in_real_units(card):
         ("age=old", "expected a number in months"),
         ("sex=X", "expected F or M"),
         ("age=500", "1 to 220 months"),
+        ("age=1_0", "expected a number in months"),
+        ("age=50,age=60", "'age' is given twice after --set"),
     ],
 )
 def test_a_bad_setting_is_explained(card, setting, complaint):
@@ -62,9 +64,35 @@ def test_a_bad_setting_is_explained(card, setting, complaint):
         app.parse_settings(card, [setting])
 
 
+def test_a_covariate_is_set_once(card):
+    with pytest.raises(InputError, match="'age' is given twice after --set; give it once"):
+        app.parse_settings(card, ["age=50", "age=60"])
+
+
+def test_the_end_of_the_range_as_it_is_told_is_accepted(card):
+    assert app.parse_settings(card, ["weight=95.04"]) == {"weight": 95.04}
+
+
+def test_a_mesh_in_the_place_of_the_atlas_is_told_by_its_contents(capsys, tmp_path):
+    egg(5.0, 1.0).export(tmp_path / "p01.stl")
+    assert app.main([str(tmp_path / "p01.stl"), "--set", "age=3"]) == 2
+    told = capsys.readouterr().err
+    assert "is an STL mesh, not an atlas" in told and "--scan p01.stl" in told and told.count("\n") == 1
+
+
 def test_sizes():
     assert app.parse_size("2560x1440") == (2560, 1440)
-    for bad in ("big", "100x100", "1280", "1280x", "1²80x800", "-1280x800", "1280x800x2"):
+    for bad in (
+        "big",
+        "100x100",
+        "99999x99999",
+        "7681x800",
+        "1280",
+        "1280x",
+        "1²80x800",
+        "-1280x800",
+        "1280x800x2",
+    ):
         with pytest.raises(InputError, match="WIDTHxHEIGHT"):
             app.parse_size(bad)
 

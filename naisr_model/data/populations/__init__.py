@@ -75,6 +75,22 @@ class PopulationModule(Protocol):
         """Write meshes and a table into ``out``; returns the path of the table."""
 
 
+MOST_PATIENTS = 100_000
+"""Of one synthetic population."""
+
+
+def require_size(seed: int, patients: int) -> None:
+    """Make sure that a population of this seed and size can be made.
+
+    Raises:
+        InputError: when there is nobody, there are too many, or the seed is none.
+    """
+    if not 1 <= patients <= MOST_PATIENTS:
+        raise InputError(f"{patients} patients were asked for; give at least 1, at most {MOST_PATIENTS}")
+    if not 0 <= seed < 2**32:
+        raise InputError(f"the seed is {seed}; give 0 or more, up to {2**32 - 1}")
+
+
 def population(name: str) -> PopulationModule:
     """The module of a population.
 

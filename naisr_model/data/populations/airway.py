@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from naisr_model.data.align import Landmarks
+from naisr_model.data.populations import require_size
 from naisr_model.data.populations.airway_anatomy import Variation, airway_landmarks, airway_mesh
 from naisr_model.data.populations.airway_growth import (
     MAX_AGE_MONTHS,
@@ -215,10 +216,7 @@ def visits(seed: int, patients: int = COHORT_PATIENTS) -> list[Visit]:
     Raises:
         InputError: when there are no patients or the seed is negative.
     """
-    if patients < 1 or seed < 0:
-        raise InputError(
-            f"{patients} patients with seed {seed} were asked for; give at least 1 and a seed of 0 or more"
-        )
+    require_size(seed, patients)
     rng = np.random.default_rng(np.random.SeedSequence([seed]))
     counts = rng.permutation(_visit_counts(patients))
     sexes = np.where(rng.permutation(patients) % 2 == 0, -1.0, 1.0)

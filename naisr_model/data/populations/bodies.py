@@ -28,6 +28,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from naisr_model.covariates import Covariate, Population
+from naisr_model.data.populations import require_size
 from naisr_model.data.tables import write_table
 from naisr_model.errors import InputError
 from naisr_model.files import replacing
@@ -115,7 +116,7 @@ def _model() -> _Model:
         from anny.shape_distribution import SimpleShapeDistribution
     except ImportError as error:
         raise InputError(
-            "the bodies population needs the package anny; pip install 'naisr-atlas-explorer[bodies]'"
+            "the bodies population needs the package anny; install it with: pip install anny"
         ) from error
     # The package's defaults compress the shapes, which takes minutes, and compile code at first use.
     body = anny.Anny(phenotype_blendshapes="original", skinning_method="lbs").to(dtype=torch.float64)
@@ -216,10 +217,7 @@ def visits(seed: int, patients: int = COHORT_PEOPLE) -> list[Visit]:
     Raises:
         InputError: when there is nobody or the seed is negative.
     """
-    if patients < 1 or seed < 0:
-        raise InputError(
-            f"{patients} people with seed {seed} were asked for; give at least 1 and a seed of 0 or more"
-        )
+    require_size(seed, patients)
     rng = np.random.default_rng(np.random.SeedSequence([seed]))
     sexes = np.where(rng.permutation(patients) % 2 == 0, -1.0, 1.0)
     # One person in each slice of the age distribution keeps it even in a small population.

@@ -11,7 +11,7 @@ import numpy as np
 
 from naisr_model.atlas import Atlas
 from naisr_model.covariates import require_known
-from naisr_model.data.populations import PopulationVisit
+from naisr_model.data.populations import MOST_PATIENTS, PopulationVisit
 from naisr_model.errors import InputError
 from naisr_model.evaluation.held_out import aligned, known_population, opened, visits_of
 from naisr_model.evaluation.journal import Record
@@ -60,8 +60,8 @@ class Calibration:
             InputError: when the atlas is not of a synthetic population, nobody is asked for, or ``known`` has
                 an unknown name.
         """
-        if self.patients < 1:
-            raise InputError(f"--patients is {self.patients}; give 1 or more")
+        if not 1 <= self.patients <= MOST_PATIENTS // 2:
+            raise InputError(f"--patients is {self.patients}; give 1 or more, up to {MOST_PATIENTS // 2}")
         atlas = opened(self.atlas)
         known_population(atlas)
         require_known(self._told(), atlas.covariates)

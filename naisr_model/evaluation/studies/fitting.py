@@ -25,6 +25,7 @@ from naisr_model.learning.training.objective import Batch
 from naisr_model.progress import SILENT, Progress
 
 SAMPLES, CHECK_POINTS, CHECK_SEED = 20_000, 4000, 1
+MOST_STEPS = 100_000
 
 
 @dataclass(frozen=True)
@@ -61,11 +62,12 @@ class Fitting:
         """The first held-out shapes.
 
         Raises:
-            InputError: when there are none to be had, or ``limit`` or ``steps`` is below 1.
+            InputError: when there are none to be had, or ``limit`` or ``steps`` is out of range.
         """
-        for option, value in (("--limit", self.limit), ("--steps", self.steps)):
-            if value < 1:
-                raise InputError(f"{option} is {value}; give 1 or more")
+        if self.limit < 1:
+            raise InputError(f"--limit is {self.limit}; give 1 or more")
+        if not 1 <= self.steps <= MOST_STEPS:
+            raise InputError(f"--steps is {self.steps}; give 1 or more, up to {MOST_STEPS}")
         atlas = opened(self.atlas)
         require_shapes(atlas, self.store, self.limit)
         return [HeldOutRow(row) for row in held_out_rows(atlas, self.limit)]

@@ -127,7 +127,9 @@ class Reconstruction:
         parts = {part: [one for one in records if one["part"] == part] for part in PARTS}
         given, inferred = (_distances(parts[way]) for way in ("given", "inferred"))
         if not given:
-            raise InputError("no fit of a held-out shape has a surface, so there is nothing to compare")
+            raise InputError(
+                "no fit of a held-out shape has a surface, so there is nothing to compare; train for longer"
+            )
         growth, effects, template = (
             [record["place"] for record in parts[part]] for part in ("growth", "effects", "template")
         )

@@ -109,7 +109,8 @@ class Transfer:
         asked = [name for name in chosen if len(_rows(atlas, name)) > 1 or _partner(atlas, name)]
         if not asked:
             raise InputError(
-                "nobody held out was seen twice, so there is nothing to predict; hold out such subjects"
+                "nobody held out was seen twice, so there is nothing to predict; prepare with a larger "
+                "--held-out or another --seed"
             )
         return [HeldOutSubject(name) for name in asked]
 

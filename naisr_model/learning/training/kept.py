@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from types import MappingProxyType
+from zipfile import ZipFile
 
 import numpy as np
 import torch
@@ -57,17 +59,34 @@ def resume(state: State, task: Task) -> None:
     if not path.exists():
         return
     try:
+        _require_undamaged(path)
         record = torch.load(path, weights_only=True, map_location=task.covariates.device)
         same = record["fingerprint"] == task.fingerprint
         if same:
             state.load(record)
-    except Exception as error:
-        raise InputError(f"{path} cannot be read ({error}); delete its folder to start again") from error
+        if state.iteration > task.iterations:
+            raise ValueError(f"{state.iteration} iterations of {task.iterations}")
+    except Exception as error:  # torch raises whatever it likes on damaged files
+        reason = (str(error).splitlines() or [repr(error)])[0]
+        raise InputError(
+            f"the training's state {path} cannot be read ({reason}); delete {task.folder} to start again"
+        ) from error
     if not same:
         raise InputError(
             f"{task.folder} holds a training with other settings or data; delete it to start again, "
             f"or give another --out"
         )
+
+
+def _require_undamaged(path: Path) -> None:
+    """Compare the archive with its checksums, which torch does not.
+
+    Raises:
+        ValueError: for a part that is another than was written.
+    """
+    with ZipFile(path) as archive:
+        if damaged := archive.testzip():
+            raise ValueError(f"{damaged} was damaged after it was written")
 
 
 def keep_template(state: State, task: Task) -> None:
@@ -88,11 +107,12 @@ def measured(state: State, task: Task) -> dict[str, float]:
     """Of surfaces that a template is deformed to, the share that folds."""
     if task.store.frame.dim != 3 or not isinstance(state.model, DeformableModel):
         return {}
-    return {"folded_share": _folded_share(state.model, state, task)}
+    share = _folded_share(state.model, state, task)
+    return {} if np.isnan(share) else {"folded_share": share}
 
 
 def _folded_share(model: DeformableModel, state: State, task: Task) -> float:
-    """Mean share of folded points near the surfaces of some training shapes, with their codes."""
+    """Mean share of folded points near the surfaces of some training shapes; NaN where one has no surface."""
     some = np.random.default_rng(0).permutation(len(task.rows))[:FOLDING_SHAPES]
     latents = residual_latents(state.codes.detach(), task.basis)[some]
     return float(np.mean(folded_shares(model, task.covariates[some], latents, resolution=64)))

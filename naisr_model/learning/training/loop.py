@@ -69,9 +69,11 @@ def train(
             started = time.monotonic()
             losses = accumulate_gradients(state, task)
             _judge(losses["total"], state, task)
+            _follow(losses["total"], state)
             # Only weights whose loss was just found sound are ever written.
             is_unwanted = progress.is_unwanted()
             if is_unwanted or started - saved > SAVE_SECONDS:
+                _require_finite(state, task)
                 save(state, task)
                 saved = time.monotonic()
             if is_unwanted:
@@ -85,21 +87,35 @@ def train(
             progress.tell(min(1.0, told.share))
             if report is not None:
                 report(told)
+    # The last step is judged like the others, by the loss of the step that would follow.
+    _judge(accumulate_gradients(state, task)["total"], state, task)
+    _require_finite(state, task)
     save(state, task)
     return save(state, task, measured(state, task))
 
 
 def _judge(total: float, state: State, task: Task) -> None:
-    """Follow the loss, and stop where it has become NaN or has broken away."""
+    """Stop where the loss has become NaN or has broken away."""
     if not math.isfinite(total) or total > DIVERGED * max(state.best, 1e-3):
         raise InputError(_divergence_message(total, state, task))
+
+
+def _require_finite(state: State, task: Task) -> None:
+    """Stop where weights or codes that this batch had no use for are not numbers."""
+    if not state.is_finite:
+        raise InputError(_divergence_message(math.nan, state, task))
+
+
+def _follow(total: float, state: State) -> None:
+    """Keep the mean of the loss of late, and the lowest."""
     state.running = total if math.isinf(state.running) else 0.98 * state.running + 0.02 * total
     state.best = min(state.best, state.running)
 
 
 def _divergence_message(total: float, state: State, task: Task) -> str:
     config, out = task.config, task.out
-    lower = [f"a {name} below {getattr(config, name):g}" for name in state.model.rated_parameters()]
+    rates = (*state.model.rated_parameters(), "latent_rate")
+    lower = [f"a {name} below {getattr(config, name):g}" for name in rates]
     kept = f"the last good state is in {out}" if out.exists() else "no good state had been saved"
     return (
         f"the training broke down at iteration {state.iteration} (loss {total:.3g}); {kept}; try again "

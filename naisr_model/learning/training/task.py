@@ -7,6 +7,7 @@ import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from reprlib import repr as shortened
 from typing import Any
 
 import numpy as np
@@ -14,13 +15,13 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from naisr_model.config import Preset, TrainingConfig
+from naisr_model.config import Preset, TrainingConfig, require_ranges
 from naisr_model.data.store import SampleStore
 from naisr_model.errors import InputError
 from naisr_model.learning.training.residual import covariate_basis
 from naisr_model.models.base import ShapeModel
 from naisr_model.models.devices import usable_device
-from naisr_model.models.factory import build, model_class
+from naisr_model.models.factory import build, layout, model_class
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,16 +107,50 @@ class State:
         }
 
     def load(self, record: dict[str, Any]) -> None:
-        """Become the state that :meth:`to_dict` gave."""
+        """Become the state that :meth:`to_dict` gave.
+
+        Raises:
+            ValueError: for what that never gives; this state is then as it was, or half the other.
+        """
+        if not isinstance(record["iteration"], int) or record["iteration"] < 0:
+            raise ValueError(f"{shortened(record['iteration'])} iterations")
+        moments, groups = record["optimiser"]["state"], self.optimiser.state_dict()["param_groups"]
+        parameters = [parameter for group in self.optimiser.param_groups for parameter in group["params"]]
+        for number, own in moments.items():
+            _require_like(own["exp_avg"], parameters[number])
+            _require_like(own["exp_avg_sq"], parameters[number])
+        for name, weight in self.model.state_dict().items():
+            _require_like(record["network"][name], weight)
+        _require_like(record["codes"], self.codes)
         self.model.load_state_dict(record["network"])
         self.codes.data.copy_(record["codes"])
-        self.optimiser.load_state_dict(record["optimiser"])
+        self.optimiser.load_state_dict({"state": moments, "param_groups": groups})
         for name in ("iteration", "seconds", "running", "best"):
-            setattr(self, name, record[name])
+            value = record[name]
+            if (
+                isinstance(value, bool)
+                or not isinstance(value, int | float)
+                or not value >= 0
+                or (name == "seconds" and math.isinf(value))
+            ):
+                raise ValueError(f"'{name}' is {shortened(value)}")
+            setattr(self, name, value)
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether all weights and codes are numbers."""
+        tensors = (*self.model.state_dict().values(), self.codes)
+        return all(bool(torch.isfinite(tensor).all()) for tensor in tensors)
 
     def share(self, task: Task) -> float:
         """How much is done, by iterations or by the time budget, whichever is nearer to its end."""
         return max(self.iteration / task.iterations, self.seconds / task.budget_s)
+
+
+def _require_like(found: Tensor, expected: Tensor) -> None:
+    """Make sure that a tensor that was kept is one of numbers in the shape of another."""
+    if found.shape != expected.shape or not torch.isfinite(found).all():
+        raise ValueError(f"weights of {tuple(found.shape)} where {tuple(expected.shape)} are expected")
 
 
 def make_task(store: SampleStore, preset: Preset, out: Path, budget_s: float, device: str) -> Task:
@@ -124,12 +159,15 @@ def make_task(store: SampleStore, preset: Preset, out: Path, budget_s: float, de
     Raises:
         InputError: when settings, model and data do not fit, or torch cannot compute on ``device``.
     """
+    if not out.name or out.is_dir():
+        raise InputError(f"'{out}' is a folder; give the name of the .safetensors file to write")
+    _check(preset)
     if preset.network.dim != store.frame.dim:
         raise InputError(
             f"the preset is for {preset.network.dim}D shapes and the store holds {store.frame.dim}D ones; "
             f"choose another preset"
         )
-    _check(preset)
+    layout(preset, len(store.population.covariates))  # refused before such networks are made
     usable_device(device)
     population = model_class(preset.model).relevant(store.population)
     rows = np.flatnonzero(~population.held_out)
@@ -149,20 +187,22 @@ def make_task(store: SampleStore, preset: Preset, out: Path, budget_s: float, de
 
 
 def _check(preset: Preset) -> None:
-    """Refuse settings that say something of covariates or of a template to a model without them."""
-    config, model = preset.training, model_class(preset.model)
-    can, loss = model.capabilities, config.loss
-    wanted = (
-        ("population_share", config.population_share, can.evolvable),
-        ("residual_latents", config.residual_latents, can.evolvable),
-        ("template_epochs", config.template_epochs, can.has_template),
-        ("loss.template_eikonal", loss.template_eikonal, can.has_template),
-        ("loss.folding", loss.folding, can.deformable),
-        ("loss.centring", loss.centring, can.trackable),
-        ("loss.ridge", loss.ridge, can.trackable),
+    """Refuse settings out of their range, and such as say something to a model that has no use for it."""
+    require_ranges(preset)
+    model, given, neutral = model_class(preset.model), preset.training, TrainingConfig()
+    can, loss, none = model.capabilities, given.loss, neutral.loss
+    settings = (
+        ("population_share", given.population_share, neutral.population_share, can.evolvable),
+        ("residual_latents", given.residual_latents, neutral.residual_latents, can.evolvable),
+        ("template_epochs", given.template_epochs, neutral.template_epochs, can.has_template),
+        ("displacement_rate", given.displacement_rate, neutral.displacement_rate, can.deformable),
+        ("loss.template_eikonal", loss.template_eikonal, none.template_eikonal, can.has_template),
+        ("loss.folding", loss.folding, none.folding, can.deformable),
+        ("loss.centring", loss.centring, none.centring, can.trackable),
+        ("loss.ridge", loss.ridge, none.ridge, can.trackable),
     )
-    for name, value, is_possible in wanted:
-        if value and not is_possible:
+    for name, value, untouched, is_possible in settings:
+        if value != untouched and not is_possible:
             raise InputError(
                 f"the setting 'training.{name}' is {value}, but {model.title} has no use for it; leave it out"
             )

@@ -13,7 +13,7 @@ import trimesh
 
 from naisr_model.covariates import Covariate, Population
 from naisr_model.data.align import Alignment
-from naisr_model.data.store import Draw, SampleStore, write_index
+from naisr_model.data.store import Draw, SampleStore, is_whole, write_index
 from naisr_model.errors import InputError
 from naisr_model.frames import Frame
 
@@ -163,3 +163,64 @@ def test_a_damaged_mesh_is_explained(store, damage):
     damage(store.folder(1) / "mesh.ply")
     with pytest.raises(InputError, match=r"mesh\.ply is damaged"):
         store.mesh(1)
+
+
+@pytest.mark.parametrize(
+    ("where", "value", "reason"),
+    [
+        ("shapes", ["shape0", "shape1"], "2 shapes of 3 visits"),
+        ("shapes", ["shape0", "../shape1", "shape2"], "'../shape1' of a shape is none of the store"),
+        ("shapes", ["shape0", "/", "shape2"], "is none of the store"),
+        ("shapes", [1, 2, 3], "not a text"),
+        ("version", "abc", "not a whole number"),
+        ("version", 0, "unknown version 0"),
+        ("name", 7, "not a text"),
+        ("options", {"surface_samples": "many"}, "not a whole number"),
+        ("options", {"near_samples": 0}, "'near_samples' is below 1"),
+        ("source", {"population": []}, "not a finite number"),
+        ("frame", {"centre_mm": [0, 0, 0], "scale_mm": 0}, "a frame of 0 mm a unit"),
+        ("population.subjects", ["a", "a", "a"], "'a', visit '1' is there twice"),
+        ("population.held_out", [True, True, True], "no shape is left"),
+        ("population.values", [[0], [1], [float("nan")]], "no finite number"),
+        ("population.values", [[0, 1, 2]], "1 by 3 numbers where 3 by 1"),
+    ],
+)
+def test_an_index_that_contradicts_itself_is_explained(store, where, value, reason):
+    index = store.path / "store.json"
+    record = json.loads(index.read_text())
+    *outer, last = where.split(".")
+    place = record
+    for step in outer:
+        place = place[step]
+    place[last] = value
+    index.write_text(json.dumps(record))
+    with pytest.raises(InputError, match=f"store.json is damaged .*{reason}.*; run 'naisr prepare' again"):
+        SampleStore.open(store.path)
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, "[]", "3", ""])
+def test_an_index_that_is_none_is_explained(store, text):
+    (store.path / "store.json").write_text(text)
+    with pytest.raises(InputError, match=r"store\.json is damaged"):
+        SampleStore.open(store.path)
+
+
+def test_arrays_that_are_shorter_than_the_index_says_are_explained(store):
+    index = store.path / "store.json"
+    record = json.loads(index.read_text())
+    index.write_text(json.dumps(record | {"options": {"near_samples": 90}}))
+    with pytest.raises(InputError, match=r"near\.npy is damaged \(80 samples where 90 are expected\)"):
+        drawn(store.path, 0)
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, 1e30])
+def test_samples_that_are_no_numbers_are_explained_and_made_again(store, wrong):
+    folder = store.path / "shapes" / "shape1"
+    counts = {kind: lines for kind, (lines, _) in COUNTS.items()}
+    assert is_whole(folder, counts, 3)
+    samples = np.load(folder / "uniform.npy")
+    samples[:, 1] = wrong
+    np.save(folder / "uniform.npy", samples)
+    with pytest.raises(InputError, match=r"uniform\.npy is damaged \(it holds what is no number"):
+        drawn(store.path, 0)
+    assert not is_whole(folder, counts, 3)

@@ -111,6 +111,7 @@ def test_its_checkpoint_keeps_everybody_s_covariates_and_no_folded_share(path):
         ("residual_latents", {"residual_latents": True}),
         ("population_share", {"population_share": 0.1}),
         ("template_epochs", {"template_epochs": (1,)}),
+        ("displacement_rate", {"displacement_rate": 1e-3}),
         ("loss.ridge", {"ridge": 0.1}),
         ("loss.folding", {"folding": 0.1}),
         ("loss.template_eikonal", {"template_eikonal": 1.0}),

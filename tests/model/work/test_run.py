@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from concurrent import futures
+from pathlib import Path
 
 import pytest
 
@@ -131,3 +132,27 @@ def test_a_machine_with_more_cores_than_there_can_be_workers(monkeypatch):
 
 def test_the_example_in_the_documentation():
     assert doctest.testmod(run).failed == 0
+
+
+UNGUARDED = """
+import math
+from naisr_model.errors import InputError
+from naisr_model.work.run import in_order, processes
+
+try:
+    with processes(2) as work:
+        in_order(work(math.sqrt, [9.0]))
+except InputError as error:
+    print(error)
+"""
+
+
+def test_a_script_without_a_main_guard_is_told_so(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(UNGUARDED)
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[3])}
+    done = subprocess.run(
+        [sys.executable, str(script)], env=environment, capture_output=True, text=True, check=False
+    )
+    assert "if __name__ == '__main__'; write it so, or run with one worker" in done.stdout
+    assert "memory" not in done.stdout and done.stderr == ""

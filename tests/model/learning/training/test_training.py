@@ -15,7 +15,7 @@ from eggs import egg, egg_preset
 
 from naisr_model.atlas import Atlas
 from naisr_model.checkpoint import load
-from naisr_model.config import FitConfig, LossWeights
+from naisr_model.config import FitConfig, LossWeights, SirenConfig
 from naisr_model.errors import Cancelled, InputError
 from naisr_model.learning.fitting.paper import fit_latents
 from naisr_model.learning.training import loop as training
@@ -144,6 +144,132 @@ def test_nan_stops_a_training_at_once(egg_store, tmp_path, monkeypatch):
     monkeypatch.setattr(step, "latent_term", nothing)
     with pytest.raises(InputError, match=r"iteration 0 \(loss nan\); no good state"):
         train(egg_store, egg_preset(epochs=1), tmp_path / "nan.safetensors")
+
+
+@pytest.mark.parametrize("rate", ["template_rate", "displacement_rate", "latent_rate"])
+def test_the_last_step_is_judged_too(egg_store, tmp_path, monkeypatch, rate):
+    def broken(optimiser):
+        for group in optimiser.param_groups:
+            if group["setting"] == rate:
+                for parameter in group["params"]:
+                    parameter.data.fill_(float("nan"))
+
+    monkeypatch.setattr(torch.optim.Adam, "step", broken)
+    plain = egg_preset(epochs=1)
+    preset = dataclasses.replace(
+        plain, training=dataclasses.replace(plain.training, batch_shapes=100, population_share=0.0)
+    )
+    with pytest.raises(InputError, match=r"broke down at iteration 1 .* a latent_rate below"):
+        train(egg_store, preset, tmp_path / "a.safetensors")
+    assert not (tmp_path / "a.safetensors").exists()
+
+
+@pytest.mark.parametrize(
+    ("setting", "value"),
+    [
+        ("template_rate", float("nan")),
+        ("latent_rate", float("inf")),
+        ("epochs", 0),
+        ("epochs", -1),
+        ("seed", -1),
+        ("batch_shapes", 0),
+        ("surface_points", -5),
+        ("population_share", 2.0),
+    ],
+)
+def test_a_setting_out_of_range_is_named_before_anything_is_written(egg_store, tmp_path, setting, value):
+    plain = egg_preset(epochs=1)
+    preset = dataclasses.replace(plain, training=dataclasses.replace(plain.training, **{setting: value}))
+    with pytest.raises(InputError, match=f"the setting 'training.{setting}' is {value}; give .* to"):
+        train(egg_store, preset, tmp_path / "a.safetensors")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_is_no_atlas_to_write(egg_store, tmp_path):
+    for folder in (tmp_path, Path()):
+        with pytest.raises(InputError, match="is a folder; give the name of the"):
+            train(egg_store, egg_preset(epochs=1), folder)
+
+
+def test_networks_too_large_for_any_machine_are_refused_before_they_are_made(egg_store, tmp_path):
+    plain = egg_preset(epochs=1)
+    network = dataclasses.replace(plain.network, template=SirenConfig(4096, 64))
+    with pytest.raises(InputError, match=r"networks have 1\.1e\+09 weights, more than 2e\+08; give smaller"):
+        train(egg_store, dataclasses.replace(plain, network=network), tmp_path / "a.safetensors")
+
+
+@pytest.fixture(scope="module")
+def stopped(egg_store, tmp_path_factory) -> Path:
+    """An atlas in training, and the state beside it."""
+    out = tmp_path_factory.mktemp("stopped") / "a.safetensors"
+    seen: list[training.Report] = []
+    with pytest.raises(Cancelled):
+        train(
+            egg_store,
+            egg_preset(epochs=2),
+            out,
+            report=seen.append,
+            progress=Progress(is_unwanted=lambda: len(seen) == 2),
+        )
+    return out
+
+
+def with_nan(tensor):
+    return torch.full_like(tensor, float("nan"))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda state: state | {"iteration": "many"},
+        lambda state: state | {"iteration": -1},
+        lambda state: state | {"iteration": 10**9},
+        lambda state: state | {"seconds": float("inf")},
+        lambda state: state | {"best": float("nan")},
+        lambda state: state | {"codes": state["codes"][:1].clone()},
+        lambda state: state | {"codes": with_nan(state["codes"])},
+        lambda state: state | {"network": {name: with_nan(one) for name, one in state["network"].items()}},
+        lambda state: state | {"network": {}},
+        lambda state: state | {"optimiser": {"state": {0: {"exp_avg": torch.zeros(2)}}}},
+        lambda state: state | {"optimiser": {"state": {99: state["optimiser"]["state"][0]}}},
+        lambda state: {name: value for name, value in state.items() if name != "fingerprint"},
+        lambda state: [1, 2],
+    ],
+)
+def test_a_state_of_other_contents_is_refused(stopped, egg_store, tmp_path, change):
+    out = tmp_path / "a.safetensors"
+    place = tmp_path / "a.safetensors.training" / "state.pt"
+    place.parent.mkdir()
+    state = torch.load(stopped.with_name(stopped.name + ".training") / "state.pt", weights_only=True)
+    torch.save(change(state), place)
+    with pytest.raises(
+        InputError, match=r"state .*state\.pt cannot be read \(.*; delete .*\.training to start"
+    ):
+        train(egg_store, egg_preset(epochs=2), out)
+    assert not out.exists()
+
+
+def test_a_state_with_a_bit_lost_is_refused_and_a_pickle_is_not_run(stopped, egg_store, tmp_path):
+    out = tmp_path / "a.safetensors"
+    place = tmp_path / "a.safetensors.training" / "state.pt"
+    place.parent.mkdir()
+    raw = bytearray((stopped.with_name(stopped.name + ".training") / "state.pt").read_bytes())
+    raw[len(raw) // 2] ^= 1
+    place.write_bytes(raw)
+    with pytest.raises(InputError, match="was damaged after it was written"):
+        train(egg_store, egg_preset(epochs=2), out)
+    torch.save({"fingerprint": Touch(tmp_path / "boom")}, place)
+    with pytest.raises(InputError, match="cannot be read"):
+        train(egg_store, egg_preset(epochs=2), out)
+    assert not (tmp_path / "boom").exists()
+
+
+class Touch:
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __reduce__(self):
+        return (Path.touch, (self.path,))
 
 
 def test_a_time_budget_bounds_the_training_over_all_its_runs(egg_store, tmp_path, monkeypatch):
