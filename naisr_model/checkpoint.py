@@ -16,7 +16,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
+from safetensors.torch import save as in_memory
 from torch import Tensor
 
 from naisr_model.config import Preset, to_json
@@ -84,7 +84,7 @@ def save(path: Path, checkpoint: Checkpoint) -> None:
     }
     metadata = {"format": FORMAT, "version": str(VERSION), "record": json.dumps(record)}
     with replacing(path) as temporary:
-        save_file(tensors, temporary, metadata)
+        temporary.write_bytes(in_memory(tensors, metadata))
 
 
 def load(path: str | Path) -> Checkpoint:

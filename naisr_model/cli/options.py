@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterable
 from pathlib import Path
@@ -10,12 +11,27 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from naisr_model.errors import InputError
+from naisr_model.files import checked_place
 
 if TYPE_CHECKING:
     from naisr_model.covariates import Covariate  # loads numpy, which '--help' does not need
 
 AtlasFile = Annotated[Path, Parameter(help="the .safetensors file.")]
-JsonFile = Annotated[Path | None, Parameter(name="--json", help="also write the figures to this file.")]
+
+
+def _require_figures(_type: object, path: Path | None) -> None:
+    """Before the work: what is no place for figures, or holds something else, is refused."""
+    if path is not None and checked_place(path).exists():
+        try:
+            json.loads(path.read_bytes() or b"{}")
+        except (OSError, ValueError) as error:
+            raise InputError(f"{path} is there and holds no figures; give another file") from error
+
+
+JsonFile = Annotated[
+    Path | None,
+    Parameter(name="--json", help="also write the figures to this file.", validator=_require_figures),
+]
 
 
 def pairs(option: str, text: str) -> dict[str, str]:

@@ -7,8 +7,6 @@ where something did, and never stops the others.
 from __future__ import annotations
 
 import hashlib
-import os
-import shutil
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,6 +18,7 @@ from naisr_model.data import align, meshes, samples, store
 from naisr_model.data.align import Alignment
 from naisr_model.data.tables import TableRow
 from naisr_model.errors import InputError
+from naisr_model.files import replacing_folder
 from naisr_model.frames import Frame
 
 
@@ -99,22 +98,18 @@ def _nested(array: NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:
 
 
 def write_samples(job: Sampling) -> bool:
-    """Sample one shape into its folder; false when the folder is already there."""
+    """Sample one shape into its folder; false when the folder is already there.
+
+    Raises:
+        InputError: when the mesh cannot be used any more, or the folder cannot be written.
+    """
     if store.is_whole(job.target, dict(zip(store.KINDS, job.counts, strict=True)), job.frame.dim):
         return False
-    shutil.rmtree(job.target, ignore_errors=True)
     mesh, _ = load(job.mesh)
     mesh.apply_transform(np.array(job.transform))
     taken = samples.sample_shape(mesh, job.frame, *job.counts, job.seed)
-    temporary = job.target.with_name(f".{job.target.name}.{os.getpid()}.tmp")
-    shutil.rmtree(temporary, ignore_errors=True)
-    temporary.mkdir()
-    for kind in store.KINDS:
-        np.save(temporary / f"{kind}.npy", getattr(taken, kind))
-    mesh.export(temporary / store.MESH)
-    try:
-        temporary.rename(job.target)
-    except OSError:  # another process was faster with the same content
-        shutil.rmtree(temporary)
-        return False
+    with replacing_folder(job.target) as temporary:
+        for kind in store.KINDS:
+            np.save(temporary / f"{kind}.npy", getattr(taken, kind))
+        mesh.export(temporary / store.MESH)
     return True
