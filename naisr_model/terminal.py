@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import NoReturn
 
@@ -51,6 +51,21 @@ def run(program: str, work: Callable[[], int], *, is_all: bool) -> int:
         return STOPPED
     finally:
         signal.signal(signal.SIGINT, signal.SIG_IGN if is_all else previous)
+
+
+@contextmanager
+def loading(program: str) -> Iterator[None]:
+    """Ctrl+C ends a program at once while it loads its own modules, unless it runs in another one."""
+    if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+    with suppress(ValueError):  # in another thread
+        signal.signal(signal.SIGINT, lambda *_: leave(program))
+    try:
+        yield
+    finally:
+        with suppress(ValueError):
+            signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def leave(program: str) -> NoReturn:

@@ -9,13 +9,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import cyclopts
-from cyclopts import Parameter
+from naisr_model.terminal import loading, run
 
-from naisr_model.errors import InputError
-from naisr_model.shipped import shipped_atlas
-from naisr_viewer import __version__
-from naisr_viewer.program import start
+with loading("naisr-viewer"):
+    import cyclopts
+    from cyclopts import Parameter
+
+    from naisr_model.errors import InputError
+    from naisr_model.files import checked_place
+    from naisr_model.shipped import shipped_atlas
+    from naisr_viewer import __version__
+    from naisr_viewer.program import start
 
 if TYPE_CHECKING:
     from naisr_viewer.state.atlas_card import AtlasCard
@@ -32,13 +36,16 @@ cli = cyclopts.App(
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the program; returns the exit code: 0, or 2 after one sentence on stderr."""
+    """Run the program; returns the exit code: 0, or 2 or 130 (Ctrl+C) after one sentence on stderr."""
+    tokens = list(sys.argv[1:] if arguments is None else arguments)
+    return run("naisr-viewer", lambda: _follow(tokens), is_all=arguments is None)
+
+
+def _follow(tokens: list[str]) -> int:
     try:
-        tokens = list(sys.argv[1:] if arguments is None else arguments)
         return cli(tokens, exit_on_error=False, print_error=False, result_action="return_value") or 0
-    except (InputError, cyclopts.CycloptsError) as error:
-        print(f"naisr-viewer: {error}", file=sys.stderr)
-        return 2
+    except cyclopts.CycloptsError as error:
+        raise InputError(str(error)) from error
 
 
 @cli.default
@@ -81,6 +88,10 @@ def view(
     pixels = parse_size(size)
     if not path.is_file():
         raise InputError(f"there is no file {path}; give the path of an atlas (.safetensors)")
+    for file in filter(None, (screenshot, measure)):
+        checked_place(file)
+    if demo is not None and demo.exists() and not demo.is_dir():
+        raise InputError(f"--demo writes into a folder, and {demo} is none; give another name")
     engine = start.make_engine(device)
     if measure is not None:
         if settings or scan or screenshot or demo:

@@ -19,6 +19,7 @@ from naisr_viewer.state.patients import OpenScan
 from naisr_viewer.state.requests import FORMATS, SurfaceResult
 
 if TYPE_CHECKING:
+    import pyvista as pv
     import trimesh
 
 
@@ -28,11 +29,8 @@ def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
     Raises:
         InputError: when the folder cannot be written to.
     """
-    try:
-        with replacing(path) as temporary:
-            write(temporary)
-    except OSError as error:
-        raise InputError(f"cannot write {path}: {error.strerror or error}; choose another folder") from error
+    with replacing(path) as temporary:
+        write(temporary)
 
 
 def write_surface(
@@ -127,6 +125,18 @@ def _write_mesh(path: Path, ending: str, result: SurfaceResult) -> None:
 
         mesh = pv.PolyData.from_regular_faces(result.points_mm, result.faces)
         mesh.point_data.active_normals = result.normals
-        mesh.save(path)
+        path.write_bytes(_vtp(mesh))
         return
     _triangles(result).export(path, file_type=ending)
+
+
+def _vtp(mesh: pv.PolyData) -> bytes:
+    """The contents of a VTP file: VTK ends the process where it writes to a full disk itself."""
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
+
+    writer = vtkXMLPolyDataWriter()
+    writer.SetInputData(mesh)
+    writer.SetDataModeToBinary()
+    writer.WriteToOutputStringOn()
+    writer.Write()
+    return writer.GetOutputString().encode("latin-1")
