@@ -55,8 +55,8 @@ class Display(Protocol):
     def show(self, share: float, words: str) -> None:
         """So much is done, 0 to 1, which ``words`` say."""
 
-    def end(self) -> None:
-        """Nothing more comes."""
+    def end(self, is_done: bool) -> None:
+        """Nothing more comes, because the work is done or has failed."""
 
 
 class Drawn:
@@ -75,7 +75,7 @@ class Drawn:
         """Fill it."""
         self._bar.update(self._task, completed=share, words=words)
 
-    def end(self) -> None:
+    def end(self, is_done: bool) -> None:
         """Leave it as it is."""
         if self._bar.live.is_started:
             self._bar.stop()
@@ -98,11 +98,13 @@ class Lines:
         """In the next line."""
         self._words = words
 
-    def end(self) -> None:
+    def end(self, is_done: bool) -> None:
         """With a last line."""
-        if self._thread.ident is not None:
-            self._ended.set()
-            self._thread.join()
+        if self._thread.ident is None:
+            return
+        self._ended.set()
+        self._thread.join()
+        if is_done:
             say(f"{self._label}: {self._words}")
 
     def _tell(self) -> None:
@@ -119,11 +121,13 @@ def _shown(label: str, *columns: ProgressColumn) -> Iterator[tuple[Display, Prog
         display.begin()
         return silent.is_unwanted()
 
-    with stoppable() as silent:
-        try:
+    is_done = False
+    try:
+        with stoppable() as silent:
             yield display, replace(silent, is_unwanted=is_unwanted)
-        finally:
-            display.end()
+        is_done = True
+    finally:
+        display.end(is_done)
 
 
 @contextlib.contextmanager

@@ -7,6 +7,7 @@ where something did, and never stops the others.
 from __future__ import annotations
 
 import hashlib
+import io
 from pathlib import Path
 from typing import NamedTuple
 
@@ -110,6 +111,13 @@ def write_samples(job: Sampling) -> bool:
     taken = samples.sample_shape(mesh, job.frame, *job.counts, job.seed)
     with replacing_folder(job.target) as temporary:
         for kind in store.KINDS:
-            np.save(temporary / f"{kind}.npy", getattr(taken, kind))
+            (temporary / f"{kind}.npy").write_bytes(_npy(getattr(taken, kind)))
         mesh.export(temporary / store.MESH)
     return True
+
+
+def _npy(array: NDArray[np.float32]) -> bytes:
+    """The contents of a .npy file; NumPy would not say what keeps it from being written."""
+    content = io.BytesIO()
+    np.save(content, array)
+    return content.getvalue()

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import MappingProxyType, TracebackType
 
 from PySide6.QtCore import QBuffer, QIODevice, QObject
-from PySide6.QtGui import QImage
+from PySide6.QtGui import QImage, QImageWriter
 
 from naisr_model.errors import InputError
 from naisr_viewer import __version__
@@ -232,6 +232,6 @@ def _encoded(image: QImage, path: Path) -> bytes:
     """The contents of a picture file; Qt would not say what keeps it from being written."""
     content = QBuffer()
     content.open(QIODevice.OpenModeFlag.WriteOnly)
-    if not image.save(content, path.suffix[1:].encode() or b"none"):
+    if not QImageWriter(content, path.suffix[1:].encode() or b"none").write(image):
         raise InputError(f"cannot write a picture to {path}; end its name with .png")
     return bytes(content.data().data())
