@@ -127,6 +127,6 @@ def mesh(
         surface = loaded.shape(values, None, resolution, extrapolate=extrapolate)
     if not len(surface.faces):
         raise InputError("there is no surface at these covariates; choose values nearer to the data")
-    with replacing(out) as temporary:
-        surface.export(temporary)
+    with replacing(out) as temporary, temporary.open("wb") as file:
+        surface.export(file, file_type=out.suffix.lower().removeprefix("."))
     print(f"{out}: {len(surface.faces)} faces, {surface.volume / 1000:.2f} cm³")

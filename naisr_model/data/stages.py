@@ -112,7 +112,8 @@ def write_samples(job: Sampling) -> bool:
     with replacing_folder(job.target) as temporary:
         for kind in store.KINDS:
             (temporary / f"{kind}.npy").write_bytes(_npy(getattr(taken, kind)))
-        mesh.export(temporary / store.MESH)
+        with (temporary / store.MESH).open("wb") as file:
+            mesh.export(file, file_type="ply")
     return True
 
 

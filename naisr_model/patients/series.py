@@ -76,8 +76,8 @@ def write_series(
                 old.unlink()
         _write_table(out / TABLE, [{**record, "scan": _named(patient)} for record in records])
         for record, person in zip(records, people, strict=True):
-            with replacing(out / str(record["mesh"])) as temporary:
-                person.surface.export(temporary)
+            with replacing(out / str(record["mesh"])) as temporary, temporary.open("wb") as file:
+                person.surface.export(file, file_type="stl")
         _write_picture(out / PICTURE, people)
     return records
 

@@ -127,7 +127,8 @@ def _write_mesh(path: Path, ending: str, result: SurfaceResult) -> None:
         mesh.point_data.active_normals = result.normals
         path.write_bytes(_vtp(mesh))
         return
-    _triangles(result).export(path, file_type=ending)
+    with path.open("wb") as file:  # which trimesh would leave open on a full disk
+        _triangles(result).export(file, file_type=ending)
 
 
 def _vtp(mesh: pv.PolyData) -> bytes:

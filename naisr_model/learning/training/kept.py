@@ -112,8 +112,9 @@ def keep_template(state: State, task: Task) -> None:
         evaluate_band(template_field(deformable(state.model)), lattice), lattice, task.store.frame
     )
     if len(mesh.faces):
-        with replacing(task.folder / "templates" / f"epoch_{epoch:05d}.ply") as temporary:
-            mesh.export(temporary)
+        path = task.folder / "templates" / f"epoch_{epoch:05d}.ply"
+        with replacing(path) as temporary, temporary.open("wb") as file:
+            mesh.export(file, file_type="ply")
 
 
 def measured(state: State, task: Task) -> dict[str, float]:
