@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from naisr_model.cli.console import bar
-from naisr_model.data.populations import POPULATIONS, population
+from naisr_model.data.populations import POPULATIONS, population, require_own
 
 PopulationName = Annotated[str, Parameter(help=f"{' or '.join(POPULATIONS)}.")]
 
@@ -22,9 +22,10 @@ def populate(name: PopulationName, out: Path, *, patients: int | None = None, se
         patients: how many patients; left out, the population's own number.
         seed: the same seed gives the same files.
     """
-    size = {} if patients is None else {"patients": patients}
+    size, module = {} if patients is None else {"patients": patients}, population(name)
+    require_own(out, name)
     with bar(f"writing {name}") as progress:
-        table = population(name).write_population(out, seed=seed, progress=progress, **size)
+        table = module.write_population(out, seed=seed, progress=progress, **size)
     print(table)
 
 

@@ -7,6 +7,7 @@ A population module offers ``visits(seed, patients)``, ``visit_shape(visit)``, `
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
@@ -73,6 +74,25 @@ class PopulationModule(Protocol):
         progress: Progress = SILENT,
     ) -> Path:
         """Write meshes and a table into ``out``; returns the path of the table."""
+
+
+def require_own(out: Path, name: str) -> None:
+    """Make sure that a folder holds no table but one of the same population, which writing it replaces.
+
+    Raises:
+        InputError: when it does, or is a file.
+    """
+    if out.exists() and not out.is_dir():
+        raise InputError(f"'{out}' is a file; give the name of a folder to write into")
+    if any((out / file).exists() for file in ("data.csv", "data.toml")) and _population_in(out) != name:
+        raise InputError(f"{out} holds a table of something else; give another folder")
+
+
+def _population_in(folder: Path) -> str | None:
+    try:
+        return str(tomllib.loads((folder / "data.toml").read_text(encoding="utf-8"))["source"]["population"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
 
 
 def population(name: str) -> PopulationModule:
