@@ -21,8 +21,9 @@ PLATFORM = "QT_QPA_PLATFORM"
 BLIND = frozenset({"offscreen", "minimal", "minimalegl"})
 """Platforms on which shapes cannot be drawn, or nothing can be seen."""
 
-_virtual: list[int] = []
-"""Connections to virtual displays: kept to the end of this process, however that comes."""
+_connections: dict[str, int] = {}
+"""By display, kept to the end of this process, however that comes: a server that loses its last one ends or
+starts anew, and Qt would meet it in the middle of that."""
 
 
 def has_display() -> bool:
@@ -81,11 +82,9 @@ def ensure_display(pixels: tuple[int, int]) -> None:
     os.close(writing)
     with os.fdopen(reading) as pipe:
         number = pipe.readline().strip()
-    connection = _connected(f":{number}") if number else None
-    if connection is None:
+    if not number or not _is_connected(f":{number}"):
         server.kill()
         raise InputError("the virtual display (Xvfb) did not start; run Xvfb by hand to see why")
-    _virtual.append(connection)
     os.environ["DISPLAY"], os.environ[PLATFORM] = f":{number}", "xcb"
 
 
@@ -94,8 +93,7 @@ def _answering() -> list[str]:
     answering = []
     if _is_wayland_there():
         answering.append("wayland")
-    if os.environ.get("DISPLAY") and (connection := _connected(os.environ["DISPLAY"])):
-        _xcb().xcb_disconnect(connection)
+    if os.environ.get("DISPLAY") and _is_connected(os.environ["DISPLAY"]):
         answering.append("xcb")
     return answering
 
@@ -119,17 +117,20 @@ def _is_wayland_there() -> bool:
     return True
 
 
-def _connected(display: str) -> int | None:
-    """A connection to an X server; None where none answers, or the library that Qt asks by is missing."""
+def _is_connected(display: str) -> bool:
+    """Whether an X server answers; not where the library is missing that Qt asks by."""
+    if display in _connections:
+        return True
     try:
         xcb = _xcb()
     except OSError:
-        return None
+        return False
     connection = xcb.xcb_connect(display.encode(), None)
     if xcb.xcb_connection_has_error(connection):
         xcb.xcb_disconnect(connection)
-        return None
-    return int(connection)
+        return False
+    _connections[display] = connection
+    return True
 
 
 def _xcb() -> ctypes.CDLL:

@@ -133,9 +133,7 @@ def test_pictures_need_no_display_that_answers_and_qt_is_imported_by_one_thread(
 
         sys.meta_path.insert(0, Watch())
         from naisr_viewer.app import main
-        from naisr_viewer.program import measure
-        measure.DRAG_S = 0.5
-        code = main([{str(egg_atlas)!r}, "--measure", {str(tmp_path / "m.json")!r}, "--size", "800x600"])
+        code = main([{str(egg_atlas)!r}, "--screenshot", {str(tmp_path / "x.png")!r}, "--size", "800x600"])
         print("code", code, "beside", beside)
         """,
         DISPLAY=DEAD,
@@ -144,7 +142,7 @@ def test_pictures_need_no_display_that_answers_and_qt_is_imported_by_one_thread(
         XDG_CACHE_HOME=str(tmp_path / "cache"),
     )
     assert "code 0 beside []" in done.stdout, done.stderr
-    assert (tmp_path / "m.json").is_file()
+    assert not QImage(str(tmp_path / "x.png")).isNull()
 
 
 @pytest.mark.parametrize("moment", ["shown", "at rest"])
