@@ -18,7 +18,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
+from safetensors.torch import save as in_memory
 from torch import Tensor
 
 from naisr_model import records
@@ -120,7 +120,7 @@ def save(path: Path, checkpoint: Checkpoint) -> None:
     digest = _digest(record, tensors)
     metadata = {"format": FORMAT, "version": str(VERSION), "record": record, "digest": digest}
     with replacing(path) as temporary:
-        save_file(tensors, temporary, metadata)
+        temporary.write_bytes(in_memory(tensors, metadata))
 
 
 def load(path: str | Path) -> Checkpoint:

@@ -1,38 +1,127 @@
-"""Files: written so that a reader, or a power cut, never meets half of one, and known by their contents."""
+"""Files: written so that a reader, or a power cut, never meets half of one, and known by their contents.
+
+Whatever keeps a file from being written ends here, in a sentence that names it; nothing half written is left.
+"""
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
 import secrets
+import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from naisr_model.errors import InputError
+
+ABANDONED_S = 3600.0
+"""A half-written file that has not grown for so long is of a run that was killed."""
+
+LOST = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
+"""What says that the content is not on the disk; another refusal to wait for it says nothing of that."""
+
+FULL = frozenset({errno.ENOSPC, errno.EDQUOT})
 
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """Yield a temporary path with the same suffix that takes the place of ``path`` on success.
 
-    On an exception the temporary file is removed and what stood at ``path`` stays as it was.
+    On an exception the temporary file is removed and what stood at ``path`` stays as it was. A link is
+    followed. What is written in between says by an :class:`OSError` that it could not be; a writer that says
+    it in another way writes into memory first.
 
     Raises:
-        InputError: for a path that is a folder's by its name (``.``, ``/``).
+        InputError: for a path that is no place for a file, or when the file cannot be written.
     """
-    if not path.name:
+    target = checked_place(path)
+    temporary = target.with_name(f".{target.stem}.{secrets.token_hex(4)}{target.suffix}")
+    with telling(path):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            temporary.touch()
+            _forget_abandoned(target, temporary.stat().st_mtime - ABANDONED_S)
+            yield temporary
+            with temporary.open("rb+") as file:  # a rename may otherwise get to the disk before the content
+                flush(file.fileno())
+            _open_to_others(temporary)
+            os.replace(temporary, target)
+        finally:
+            temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def replacing_folder(path: Path) -> Iterator[Path]:
+    """The same for a folder of files: yield an empty one that takes the place of ``path`` on success.
+
+    Raises:
+        InputError: when it cannot be written.
+    """
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    shutil.rmtree(temporary, ignore_errors=True)
+    with telling(path):
+        try:
+            temporary.mkdir()
+            yield temporary
+            shutil.rmtree(path, ignore_errors=True)
+            temporary.rename(path)
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
+
+
+def checked_place(path: Path) -> Path:
+    """Where a file that is to be written will be, links followed; asked before the work that it is to hold.
+
+    Raises:
+        InputError: for a folder, a device or a pipe, and where the folder around it cannot be written to.
+    """
+    if not path.name or path.is_dir():
         raise InputError(f"'{path}' is a folder; give the name of a file to write")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}{path.suffix}")
+    if path.exists() and not path.is_file():
+        raise InputError(f"'{path}' is a device or a pipe; give the name of a file to write")
+    target = Path(os.path.realpath(path))
+    around = next(folder for folder in target.parents if folder.exists())
+    if not around.is_dir():
+        raise InputError(f"cannot write {path}: {around} is a file, no folder; choose another folder")
+    if not os.access(around, os.W_OK | os.X_OK):
+        raise InputError(f"cannot write {path}: {around} cannot be written to; choose another folder")
+    return target
+
+
+def forget_unfinished(path: Path) -> None:
+    """Remove what killed runs left of ``path``; for whoever alone writes it."""
+    _forget_abandoned(path, float("inf"))
+
+
+@contextmanager
+def telling(path: Path) -> Iterator[None]:
+    """Says in a sentence why ``path`` could not be written.
+
+    Raises:
+        InputError: in the place of an :class:`OSError`.
+    """
     try:
-        yield temporary
-        _flush(temporary)
-        # Some writers make private files; a saved file is as readable as any other.
-        temporary.chmod(0o666 & ~_UMASK)
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+        yield
+    except OSError as error:
+        remedy = "free some space and run again" if error.errno in FULL else "choose another folder"
+        raise InputError(f"cannot write {path}: {error.strerror or error}; {remedy}") from error
+
+
+def flush(descriptor: int) -> None:
+    """Wait until what was written is on the disk.
+
+    Some file systems cannot wait; the content is as safe there as it gets.
+
+    Raises:
+        OSError: when it did not get there.
+    """
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        if error.errno in LOST:
+            raise
 
 
 def require_file(path: Path, kind: str) -> None:
@@ -60,10 +149,20 @@ def sources_digest(*folders: Path) -> bytes:
     return hashlib.sha256(b"".join(file.read_bytes() for file in sources)).digest()
 
 
-def _flush(path: Path) -> None:
-    """Wait until the content is on the disk: a rename may otherwise get there first."""
-    with path.open("rb+") as file:
-        os.fsync(file.fileno())
+def _forget_abandoned(path: Path, before: float) -> None:
+    """Remove half-written files of ``path`` last changed before then, in seconds of the epoch."""
+    start, length = f".{path.stem}.", len(path.stem) + len(path.suffix) + 10
+    with suppress(OSError), os.scandir(path.parent) as entries:
+        for entry in entries:
+            is_ours = entry.name.startswith(start) and entry.name.endswith(path.suffix)
+            if is_ours and len(entry.name) == length and entry.stat().st_mtime < before:
+                Path(entry.path).unlink(missing_ok=True)
+
+
+def _open_to_others(path: Path) -> None:
+    """Some writers make private files; a saved file is as readable as any other, where permissions exist."""
+    with suppress(OSError):
+        path.chmod(0o666 & ~_UMASK)
 
 
 def _read_umask() -> int:

@@ -9,14 +9,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import cyclopts
-from cyclopts import Parameter
+from naisr_model.terminal import loading, run
 
-from naisr_model.errors import InputError
-from naisr_model.files import require_file
-from naisr_model.shipped import shipped_atlas
-from naisr_viewer import __version__
-from naisr_viewer.program import start
+with loading("naisr-viewer"):
+    import cyclopts
+    from cyclopts import Parameter
+
+    from naisr_model.errors import InputError
+    from naisr_model.files import checked_place, require_file
+    from naisr_model.shipped import shipped_atlas
+    from naisr_viewer import __version__
+    from naisr_viewer.program import start
 
 if TYPE_CHECKING:
     from naisr_viewer.state.atlas_card import AtlasCard
@@ -33,13 +36,16 @@ cli = cyclopts.App(
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the program; returns the exit code: 0, or 2 after one sentence on stderr."""
+    """Run the program; returns the exit code: 0, or 2 or 130 (Ctrl+C) after one sentence on stderr."""
+    tokens = list(sys.argv[1:] if arguments is None else arguments)
+    return run("naisr-viewer", lambda: _follow(tokens), is_all=arguments is None)
+
+
+def _follow(tokens: list[str]) -> int:
     try:
-        tokens = list(sys.argv[1:] if arguments is None else arguments)
         return cli(tokens, exit_on_error=False, print_error=False, result_action="return_value") or 0
-    except (InputError, cyclopts.CycloptsError) as error:
-        print(f"naisr-viewer: {error}", file=sys.stderr)
-        return 2
+    except cyclopts.CycloptsError as error:
+        raise InputError(str(error)) from error
 
 
 @cli.default
@@ -86,6 +92,10 @@ def view(
     require_file(path, "an atlas (.safetensors)")
     if label is not None and scan is None:
         raise InputError(f"--label {label} is of a scan; give --scan FILE too")
+    for file in filter(None, (screenshot, measure)):
+        checked_place(file)
+    if demo is not None and demo.exists() and not demo.is_dir():
+        raise InputError(f"--demo writes into a folder, and {demo} is none; give another name")
     engine = start.make_engine(device)
     if measure is not None:
         if settings or scan or label is not None or screenshot or demo:

@@ -19,7 +19,7 @@ FLOORS = {
     "naisr_model": (
         ("__init__",),
         (
-            *("errors", "files", "exports", "shipped", "records", "covariates", "numerals"),
+            *("errors", "files", "exports", "shipped", "terminal", "records", "covariates", "numerals"),
             *("frames", "config", "progress", "capabilities"),
         ),
         ("work",),
@@ -64,7 +64,9 @@ class Rule:
 
 COVARIATES = "naisr_model.covariates"
 VOCABULARY = (COVARIATES, "naisr_model.capabilities")
-LIGHT = tuple(f"naisr_model.{name}" for name in ("errors", "exports", "files", "progress", "shipped"))
+LIGHT = tuple(
+    f"naisr_model.{name}" for name in ("errors", "exports", "files", "progress", "shipped", "terminal")
+)
 """What anybody may use."""
 
 CANVAS = "naisr_viewer.views.shapes.canvas"

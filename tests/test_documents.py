@@ -19,7 +19,7 @@ from typing import Any
 
 import pytest
 
-from naisr_model.cli import app as naisr
+from naisr_model.cli.commands import app as naisr
 from naisr_viewer.app import cli as naisr_viewer
 
 ROOT = Path(__file__).parents[1]

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from naisr_model.cli.console import bar
 from naisr_model.cli.options import FolderToWrite
-from naisr_model.data.populations import POPULATIONS, population
+from naisr_model.data.populations import POPULATIONS, population, require_own
 from naisr_model.data.remarks import gravest_first
 from naisr_model.errors import InputError
 
@@ -25,9 +25,10 @@ def populate(name: PopulationName, out: FolderToWrite, *, patients: int | None =
         patients: how many patients; left out, the population's own number.
         seed: the same seed gives the same files.
     """
-    size = {} if patients is None else {"patients": patients}
+    size, module = {} if patients is None else {"patients": patients}, population(name)
+    require_own(out, name)
     with bar(f"writing {name}") as progress:
-        table = population(name).write_population(out, seed=seed, progress=progress, **size)
+        table = module.write_population(out, seed=seed, progress=progress, **size)
     print(table)
 
 

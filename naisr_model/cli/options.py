@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Sequence
@@ -11,6 +12,7 @@ from typing import Annotated, Any
 from cyclopts import CoercionError, Parameter, convert
 
 from naisr_model.errors import InputError
+from naisr_model.files import checked_place
 
 AtlasFile = Annotated[Path, Parameter(help="the .safetensors file.")]
 WHOLE = r"[+-]?[0-9]{1,18}"
@@ -34,23 +36,32 @@ def _converted(kind: Any, word: str) -> Any:
     return convert(kind, [word])
 
 
-def _require_file(_kind: Any, path: Path | None) -> None:
-    """Refuse a folder before hours of work have nowhere to go."""
-    if path is not None and (path.is_dir() or not path.name):
-        raise ValueError("It is a folder; give the name of a file to write")
+def _require_place(_kind: Any, path: Path | None) -> None:
+    """Refuse what is no place for a file before hours of work have nowhere to go."""
+    if path is not None:
+        checked_place(path)
+
+
+def _require_figures(_kind: Any, path: Path | None) -> None:
+    """The same of a place for figures, and what holds something else."""
+    if path is not None and checked_place(path).exists():
+        try:
+            json.loads(path.read_bytes() or b"{}")
+        except (OSError, ValueError) as error:
+            raise InputError(f"{path} is there and holds no figures; give another file") from error
 
 
 def _require_folder(_kind: Any, path: Path | None) -> None:
     """The same where a folder is wanted."""
     if path is not None and path.exists() and not path.is_dir():
-        raise ValueError("It is a file; give the name of a folder to write into")
+        raise InputError(f"'{path}' is a file; give the name of a folder to write into")
 
 
-FileToWrite = Annotated[Path, Parameter(validator=_require_file)]
+FileToWrite = Annotated[Path, Parameter(validator=_require_place)]
 FolderToWrite = Annotated[Path, Parameter(validator=_require_folder)]
 JsonFile = Annotated[
     Path | None,
-    Parameter(name="--json", help="also write the figures to this file.", validator=_require_file),
+    Parameter(name="--json", help="also write the figures to this file.", validator=_require_figures),
 ]
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -13,6 +12,7 @@ from cyclopts import Parameter
 from naisr_model.cli.console import bar, stoppable, write_json
 from naisr_model.cli.options import AtlasFile, FolderToWrite, JsonFile
 from naisr_model.errors import InputError
+from naisr_model.terminal import say
 
 if TYPE_CHECKING:
     from naisr_model.covariates import Covariate, Values  # loads numpy, which '--help' does not need
@@ -59,12 +59,13 @@ def fit(
     from naisr_model.patients.evolution import fit_record
     from naisr_model.patients.series import write_series
 
+    _require_own(out, patient)
     fitted, intake = _fitted(patient, _loaded(atlas), reading)
     record = fit_record(fitted)
-    _tell_fit(fitted, record["alternatives"])
     if out is not None:
-        write_series(out, [fitted.individual])
+        write_series(out, [fitted.individual], patient)
     write_json(json_file, {"patient": intake.to_json(), **record})
+    _tell_fit(fitted, record["alternatives"])
 
 
 def transfer(
@@ -87,11 +88,12 @@ def transfer(
     """Show a patient's shape at other covariates, as it is expected on another day."""
     from naisr_model.covariates import read_values
 
+    _require_own(out, patient)
     loaded = _transferable(atlas)
     wanted = read_values("--to", [to], loaded.covariates)
     loaded.complete(wanted)  # refused before the fit
     fitted, intake = _fitted(patient, loaded, reading)
-    _tell_series(fitted, intake, [fitted.individual, fitted.at(wanted)], out, json_file)
+    _tell_series(fitted, intake, [fitted.individual, fitted.at(wanted)], patient, out, json_file)
 
 
 def evolve(
@@ -122,10 +124,19 @@ def evolve(
     """Follow a patient's shape along one covariate."""
     from naisr_model.patients.evolution import evolution, require_way
 
+    _require_own(out, patient)
     loaded, way = _transferable(atlas), (along, start, stop, steps, path)
     require_way(loaded, *way)  # refused before the fit
     fitted, intake = _fitted(patient, loaded, reading)
-    _tell_series(fitted, intake, evolution(fitted, *way), out, json_file)
+    _tell_series(fitted, intake, evolution(fitted, *way), patient, out, json_file)
+
+
+def _require_own(out: Path | None, patient: Path) -> None:
+    """Before the work: a folder of somebody else's is refused."""
+    from naisr_model.patients.series import require_own
+
+    if out is not None:
+        require_own(out, patient)
 
 
 def _loaded(atlas: Path) -> Any:
@@ -157,7 +168,7 @@ def _fitted(patient: Path, loaded: Any, reading: IntakeOptions) -> tuple[Any, An
     with stoppable() as progress:
         intake = take_in(patient, loaded, known, **options, progress=progress)
     for sentence in intake.sentences:
-        print(f"naisr: {sentence}", file=sys.stderr)
+        say(f"naisr: {sentence}")
     with bar("fitting") as progress:
         fitted = loaded.fit(intake.patient.mesh_mm, known, progress=progress)
     return fitted, intake
@@ -193,15 +204,15 @@ def _row(covariates: Iterable[Covariate], values: Values) -> str:
 
 
 def _tell_series(
-    fitted: Any, intake: Any, people: Sequence[Any], out: Path | None, json_file: Path | None
+    fitted: Any, intake: Any, people: Sequence[Any], patient: Path, out: Path | None, json_file: Path | None
 ) -> None:
     from naisr_model.patients.series import write_series
 
     with bar("measuring") as progress:
-        records = write_series(out, people, progress=progress)
+        records = write_series(out, people, patient, progress=progress)
+    write_json(json_file, {"patient": intake.to_json(), "lasting": fitted.lasting, "shapes": records})
     for person, record in zip(people, records, strict=True):
         where = _row(person.atlas.covariates, person.covariates)
         low, high = record["volume_low_cm3"], record["volume_high_cm3"]
         print(f"{where}: {record['volume_cm3']:.1f} cm³ ({low:.1f} to {high:.1f})")
     print(f"at other covariates {100 * fitted.lasting:.0f} % of what sets the patient apart is kept")
-    write_json(json_file, {"patient": intake.to_json(), "lasting": fitted.lasting, "shapes": records})

@@ -38,7 +38,7 @@ def train(
     seed: int | None = None,
     device: str = "cpu",
 ) -> None:
-    """Train an atlas, see :data:`naisr_model.cli.TRAINING`.
+    """Train an atlas, see :data:`naisr_model.cli.commands.TRAINING`.
 
     Args:
         store: made by 'naisr prepare'.

@@ -12,7 +12,7 @@ import json
 import re
 import shutil
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -39,10 +39,13 @@ from naisr_model.errors import InputError
 from naisr_model.files import replacing
 from naisr_model.frames import Frame, enclosing_frame
 from naisr_model.progress import SILENT, Progress
+from naisr_model.work.alone import alone
 from naisr_model.work.run import Run, in_order, processes
 
 REPORT = "report.json"
-_OWN_NAME = re.compile(r"[0-9a-f]{24}|\.[0-9a-f]{24}\.\d+\.tmp")
+_SAMPLES = re.compile(r"[0-9a-f]{24}")
+_HALF_DONE = re.compile(r"\.[0-9a-f]{24}\.\d+\.tmp")
+"""Names of the folders that :func:`_sampling` and :func:`write_samples` make."""
 
 
 MOST_SAMPLES = 10_000_000
@@ -94,9 +97,13 @@ def prepare(
         Cancelled: when nobody waits any more.
     """
     options, out = options or PrepareOptions(), Path(out)
+    table = _checked_table(csv, options)
+    with _held(out, table.name):
+        return _prepare(table, out, options, progress)
+
+
+def _prepare(table: ShapeTable, out: Path, options: PrepareOptions, progress: Progress) -> PreparationReport:
     with processes(options.workers) as run:
-        table = _checked_table(csv, options)
-        _make_folder(out / store.SHAPES)
         held_out = held_out_mask([row.subject for row in table.rows], options.held_out, options.seed)
         looks = [(row, table.alignment.method) for row in table.rows]
         inputs = _beside_each_other(table, in_order(run(inspect, looks, progress.part(0.0, 0.05))))
@@ -119,7 +126,7 @@ def prepare(
         options={key: value for key, value in asdict(options).items() if key != "workers"},
         folders=folders,
     )
-    _remove_strangers(out / store.SHAPES, set(folders))
+    _remove(out / store.SHAPES, _SAMPLES, set(folders))
     report = _report(table, inputs, placed, dict(zip(usable, written, strict=True)))
     with replacing(out / REPORT) as temporary:
         temporary.write_text(json.dumps(report.to_json(), indent=1), encoding="utf-8")
@@ -140,6 +147,34 @@ def _checked_table(csv: str | Path, options: PrepareOptions) -> ShapeTable:
     if any(row.mesh == Path(csv).parent for row in table.rows):
         raise InputError(f"{Path(csv).name} has no column 'mesh'; add one with the path of each mesh")
     return table
+
+
+@contextmanager
+def _held(out: Path, name: str) -> Iterator[None]:
+    """The folder of the store to ourselves, without what a run leaves half done that was killed or stopped.
+
+    Raises:
+        InputError: when it holds something else, or another run writes there.
+    """
+    _require_own(out, name)
+    _make_folder(out / store.SHAPES)
+    with alone(out / ".lock", f"another run prepares {out}; wait until it has ended, or give another --out"):
+        _remove(out / store.SHAPES, _HALF_DONE)
+        try:
+            yield
+        finally:
+            _remove(out / store.SHAPES, _HALF_DONE)
+
+
+def _require_own(out: Path, name: str) -> None:
+    if (out / REPORT).exists() and not (out / store.INDEX).exists():
+        raise InputError(f"{out} holds a {REPORT} of something else; give another --out")
+    try:
+        other = store.SampleStore.open(out).name
+    except InputError:  # of an unfinished or damaged store, which is mended
+        return
+    if other != name:
+        raise InputError(f"{out} holds the store of '{other}', not of '{name}'; give another --out")
 
 
 def _make_folder(path: Path) -> None:
@@ -307,11 +342,8 @@ def _sampling(
     return Sampling(row.mesh, placed.transform, frame, counts, int(fingerprint[24:40], 16), target)
 
 
-def _remove_strangers(folder: Path, known: set[str]) -> None:
-    """Delete samples that the store no longer refers to, and what a killed run left half done.
-
-    Only names that :func:`_sampling` and :func:`write_samples` make: the user may keep other things here.
-    """
+def _remove(folder: Path, pattern: re.Pattern[str], known: Set[str] = frozenset()) -> None:
+    """Delete what is named so and not ``known``: the user may keep other things here."""
     for path in folder.iterdir():
-        if path.name not in known and _OWN_NAME.fullmatch(path.name):
+        if path.name not in known and pattern.fullmatch(path.name):
             shutil.rmtree(path, ignore_errors=True)

@@ -7,8 +7,7 @@ where something did, and never stops the others.
 from __future__ import annotations
 
 import hashlib
-import os
-import shutil
+import io
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,6 +20,7 @@ from naisr_model.data.comparison import Bulk, measured
 from naisr_model.data.remarks import Remark
 from naisr_model.data.tables import TableRow, require_file
 from naisr_model.errors import InputError
+from naisr_model.files import replacing_folder
 from naisr_model.frames import Frame
 
 
@@ -91,22 +91,26 @@ def _nested(array: NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:
 
 
 def write_samples(job: Sampling) -> bool:
-    """Sample one shape into its folder; false when the folder is already there."""
+    """Sample one shape into its folder; false when the folder is already there.
+
+    Raises:
+        InputError: when the mesh cannot be used any more, or the folder cannot be written.
+    """
     if store.is_whole(job.target, dict(zip(store.KINDS, job.counts, strict=True)), job.frame.dim):
         return False
-    shutil.rmtree(job.target, ignore_errors=True)
     mesh = meshes.sound_mesh(job.mesh).mesh_mm
     mesh.apply_transform(np.array(job.transform))
     taken = samples.sample_shape(mesh, job.frame, *job.counts, job.seed)
-    temporary = job.target.with_name(f".{job.target.name}.{os.getpid()}.tmp")
-    shutil.rmtree(temporary, ignore_errors=True)
-    temporary.mkdir()
-    for kind in store.KINDS:
-        np.save(temporary / f"{kind}.npy", getattr(taken, kind))
-    mesh.export(temporary / store.MESH)
-    try:
-        temporary.rename(job.target)
-    except OSError:  # another process was faster with the same content
-        shutil.rmtree(temporary)
-        return False
+    with replacing_folder(job.target) as temporary:
+        for kind in store.KINDS:
+            (temporary / f"{kind}.npy").write_bytes(_npy(getattr(taken, kind)))
+        with (temporary / store.MESH).open("wb") as file:
+            mesh.export(file, file_type="ply")
     return True
+
+
+def _npy(array: NDArray[np.float32]) -> bytes:
+    """The contents of a .npy file; NumPy would not say what keeps it from being written."""
+    content = io.BytesIO()
+    np.save(content, array)
+    return content.getvalue()

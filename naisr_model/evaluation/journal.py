@@ -2,23 +2,22 @@
 
 The first line says of what the journal is; every other one is a case. A line counts once it is complete, so
 the half of one that a killed run leaves is forgotten, and its case is measured again. One run keeps a journal
-at a time: it holds the file of the same name with ``.lock`` behind it, which a killed run lets go of.
+at a time: it holds the file of the same name with ``.lock`` behind it, which goes with the run.
 """
 
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from io import BufferedWriter
+from io import FileIO
 from pathlib import Path
 from typing import Any
 
-from filelock import FileLock, Timeout
-
 from naisr_model import records
 from naisr_model.errors import InputError
+from naisr_model.files import checked_place, flush, telling
+from naisr_model.work.alone import alone
 
 Record = dict[str, Any]
 """Plain JSON types by name."""
@@ -58,36 +57,32 @@ def keeping(path: Path, identity: Record) -> Iterator[tuple[dict[str, Record], K
         identity: of what it is: its first line.
 
     Raises:
-        InputError: when it is of something else, no journal, or kept by another run.
+        InputError: when it is of something else, no journal, kept by another run, or cannot be written.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with _alone(path):
+    told = f"another run keeps {path}; wait until it has ended, or name another journal"
+    target = checked_place(path)
+    with alone(target.with_name(f"{target.name}.lock"), told):
         records, whole = read(path, identity), _complete_lines(path, identity)
-        with path.open("ab") as file:
-            file.truncate(sum(map(len, whole)))
+        with _opened(path) as file:
+            with telling(path):
+                file.truncate(sum(map(len, whole)))
             if not whole:
-                _add(file, identity)
-            yield records, lambda key, record: _add(file, {"key": key, "record": record})
+                _add(path, file, identity)
+            yield records, lambda key, record: _add(path, file, {"key": key, "record": record})
 
 
-@contextmanager
-def _alone(path: Path) -> Iterator[None]:
-    lock = FileLock(path.with_name(path.name + ".lock"))
-    try:
-        held = lock.acquire(blocking=False)
-    except Timeout as error:
-        raise InputError(
-            f"another run keeps {path}; wait until it has ended, or name another journal"
-        ) from error
-    with held:
-        yield
+def _opened(path: Path) -> FileIO:
+    with telling(path):
+        return path.open("ab", buffering=0)
 
 
-def _add(file: BufferedWriter, value: Record) -> None:
+def _add(path: Path, file: FileIO, value: Record) -> None:
     """Add a line, and wait until it is on the disk."""
-    file.write(_line(value))
-    file.flush()
-    os.fsync(file.fileno())
+    left = memoryview(_line(value))
+    with telling(path):
+        while left:  # a disk that is nearly full takes a part
+            left = left[file.write(left) :]
+        flush(file.fileno())
 
 
 def _line(value: Record) -> bytes:

@@ -10,39 +10,94 @@ from pathlib import Path
 import pyvista as pv
 
 from naisr_model.atlas import Individual
+from naisr_model.errors import InputError
 from naisr_model.files import replacing
 from naisr_model.progress import SILENT, Progress
+
+TABLE, PICTURE = "volumes.csv", "shapes.png"
 
 PIXELS = 400
 """Sides of each shape's part of the picture."""
 
 
+def require_own(out: Path, patient: Path | None) -> None:
+    """Make sure that a folder holds no series of anybody else.
+
+    Args:
+        out: the folder; it may be missing.
+        patient: the file whose series is to be there; None for no patient's.
+
+    Raises:
+        InputError: when it holds files of another patient or of something else, or is a file.
+    """
+    if out.exists() and not out.is_dir():
+        raise InputError(f"'{out}' is a file; give the name of a folder to write into")
+    if there := _files(out):
+        owner = _owner(out / TABLE)
+        if owner != _named(patient):
+            whose = owner or "something else"
+            raise InputError(f"{out} holds {there[0].name} of {whose}; give another folder")
+
+
 def write_series(
     out: Path | None,
     people: Sequence[Individual],
+    patient: Path | None = None,
     *,
     progress: Progress = SILENT,
 ) -> list[dict[str, float | str]]:
     """Measure each shape and, with ``out``, write it with a table and a picture into that folder.
 
+    What an earlier series of the same patient left there is removed first: the files belong together.
+
+    Args:
+        out: the folder.
+        people: the shapes.
+        patient: the file that they were made from.
+        progress: told the finished share.
+
     Returns:
         A record for each: covariates in real units, volume and its 95 % interval in cm³, mesh name.
 
     Raises:
+        InputError: when the folder holds something else, see :func:`require_own`, or cannot be written.
         Cancelled: when nobody waits any more.
     """
+    if out is not None:
+        require_own(out, patient)
     records: list[dict[str, float | str]] = []
     for (number, person), _ in progress.over(list(enumerate(people, start=1))):
         low, high = person.volume_interval_cm3
         volumes = {"volume_cm3": person.volume_cm3, "volume_low_cm3": low, "volume_high_cm3": high}
         records.append({**person.covariates, **volumes, "mesh": f"shape{number:02d}.stl"})
-        if out is not None:
-            with replacing(out / f"shape{number:02d}.stl") as temporary:
-                person.surface.export(temporary)
     if out is not None:
-        _write_table(out / "volumes.csv", records)
-        _write_picture(out / "shapes.png", people)
+        for old in _files(out):
+            if old.name != TABLE:  # which says whose the others are, until a new one does
+                old.unlink()
+        _write_table(out / TABLE, [{**record, "scan": _named(patient)} for record in records])
+        for record, person in zip(records, people, strict=True):
+            with replacing(out / str(record["mesh"])) as temporary, temporary.open("wb") as file:
+                person.surface.export(file, file_type="stl")
+        _write_picture(out / PICTURE, people)
     return records
+
+
+def _files(out: Path) -> list[Path]:
+    """What is there of a series, whoever's."""
+    return [*sorted(out.glob("shape[0-9][0-9]*.stl")), *filter(Path.exists, (out / TABLE, out / PICTURE))]
+
+
+def _named(patient: Path | None) -> str:
+    return "" if patient is None else str(patient.resolve())
+
+
+def _owner(table: Path) -> str | None:
+    """Whose a series is; None of a table that is none of ours."""
+    try:
+        with table.open(newline="", encoding="utf-8") as file:
+            return next(csv.DictReader(file), {}).get("scan")
+    except (OSError, ValueError, csv.Error):
+        return None
 
 
 def _title(person: Individual) -> str:
@@ -78,6 +133,8 @@ def _write_picture(path: Path, people: Sequence[Individual]) -> None:
     plotter.background_color = "white"
     plotter.link_views()
     plotter.view_yz()
-    with replacing(path) as temporary:
-        plotter.screenshot(temporary)
-    plotter.close()
+    try:
+        with replacing(path) as temporary:
+            plotter.screenshot(temporary)
+    finally:
+        plotter.close()

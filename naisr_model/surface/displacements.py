@@ -15,7 +15,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from safetensors import SafetensorError
-from safetensors.numpy import load_file, save_file
+from safetensors.numpy import load_file
+from safetensors.numpy import save as in_memory
 from scipy.interpolate import CubicSpline
 from torch import Tensor
 from torch.nn import functional
@@ -83,7 +84,7 @@ class DisplacementTables:
         # The writer takes what lies in memory, strides or not.
         packed = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
         with replacing(path) as temporary:
-            save_file(packed, temporary)
+            temporary.write_bytes(in_memory(packed))
 
     @classmethod
     def load(cls, path: Path) -> DisplacementTables:

@@ -8,7 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType, TracebackType
 
-from PySide6.QtCore import QObject
+from PySide6.QtCore import QBuffer, QIODevice, QObject
+from PySide6.QtGui import QImage, QImageWriter
 
 from naisr_model.errors import InputError
 from naisr_viewer import __version__
@@ -117,14 +118,9 @@ class Controller(QObject):
 
     def save_screenshot(self, path: Path) -> None:
         """Write a picture of the whole window; the ending of ``path`` says which kind."""
-        image = self._window.grab_image()
-
-        def write(place: Path) -> None:
-            if not image.save(str(place)):
-                raise InputError(f"cannot write a picture to {path}; end its name with .png")
-
         try:
-            write_atomically(path, write)
+            content = _encoded(self._window.grab_image(), path)
+            write_atomically(path, lambda place: place.write_bytes(content))
         except InputError as error:
             self._window.show_error(in_words(error))
         else:
@@ -230,3 +226,12 @@ class Controller(QObject):
         self._before_move = None
         self._window.shapes.set_moving(False)
         self._window.covariates.forget_moves()
+
+
+def _encoded(image: QImage, path: Path) -> bytes:
+    """The contents of a picture file; Qt would not say what keeps it from being written."""
+    content = QBuffer()
+    content.open(QIODevice.OpenModeFlag.WriteOnly)
+    if not QImageWriter(content, path.suffix[1:].encode() or b"none").write(image):
+        raise InputError(f"cannot write a picture to {path}; end its name with .png")
+    return bytes(content.data().data())

@@ -29,6 +29,18 @@ def load_atlas(path: Path, device: str = "cpu") -> Atlas:
     return Atlas.load(path, device)
 
 
+def require_device(device: str) -> None:
+    """Make sure that torch can compute there: the cache may answer for networks that could not be loaded.
+
+    Raises:
+        InputError: when it cannot.
+    """
+    if device != "cpu":  # which is always there, and torch takes a second to be asked
+        from naisr_model.models.devices import usable_device
+
+        usable_device(device)
+
+
 @dataclass(frozen=True, eq=False)
 class Opened:
     """An atlas that is open; its networks may still have to be loaded.

@@ -108,7 +108,7 @@ class Cache:
 
     def keep_opening(self, fingerprint: str, opening: Opening) -> None:
         """For the next run."""
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(InputError, OSError):
             with replacing(self._file(fingerprint, OPENING)) as temporary:
                 _write_opening(temporary, opening)
             self._forget_oldest(OPENING)
@@ -123,7 +123,7 @@ class Cache:
 
     def keep_tables(self, fingerprint: str, tables: DisplacementTables) -> None:
         """For the next run."""
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(InputError, OSError):
             tables.save(self._file(fingerprint, DISPLACEMENTS))
             self._forget_oldest(DISPLACEMENTS)
 

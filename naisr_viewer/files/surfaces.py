@@ -29,11 +29,8 @@ def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
     Raises:
         InputError: when the folder cannot be written to.
     """
-    try:
-        with replacing(path) as temporary:
-            write(temporary)
-    except OSError as error:
-        raise InputError(f"cannot write {path}: {error.strerror or error}; choose another folder") from error
+    with replacing(path) as temporary:
+        write(temporary)
 
 
 def write_surface(

@@ -8,7 +8,6 @@ from __future__ import annotations
 import gc
 import locale
 import os
-import signal
 import sys
 import time
 from collections.abc import Iterator, Mapping
@@ -20,9 +19,9 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from naisr_model.errors import InputError
-from naisr_viewer.engine.atlases import load_atlas
+from naisr_viewer.engine.atlases import load_atlas, require_device
 from naisr_viewer.engine.engine import Engine
-from naisr_viewer.program.display import ensure_display, has_display
+from naisr_viewer.program.display import ensure_display, require_display
 
 if TYPE_CHECKING:
     from PySide6.QtWidgets import QApplication
@@ -63,9 +62,14 @@ class First:
 
 
 def make_engine(device: str) -> Engine:
-    """What computes surfaces, on a machine that is set up for a window beside it."""
+    """What computes surfaces, on a machine that is set up for a window beside it.
+
+    Raises:
+        InputError: when surfaces cannot be computed on ``device``.
+    """
     leave_a_core_to_the_window()
     gc.set_threshold(50_000)  # imports make many objects that stay: seldom worth looking through
+    require_device(device)
     return Engine(partial(load_atlas, device=device))
 
 
@@ -109,14 +113,20 @@ def make_application() -> QApplication:
     """The one application object, styled alike on every platform.
 
     Qt takes over the user's locale, decimal comma included, and every C library in the process would follow.
+
+    Raises:
+        InputError: when shapes cannot be drawn on this display.
     """
     from PySide6.QtWidgets import QApplication
+
+    from naisr_viewer.program.opengl import require_opengl
 
     app = QApplication.instance() or QApplication(["naisr-viewer"])
     assert isinstance(app, QApplication)
     locale.setlocale(locale.LC_NUMERIC, "C")
     app.setApplicationName("naisr-viewer")
     app.setStyle("Fusion")
+    require_opengl()
     return app
 
 
@@ -124,16 +134,18 @@ def attended(engine: Engine, first: First, pixels: tuple[int, int]) -> int:
     """The window in the hands of a person, until it is closed."""
     from PySide6.QtCore import Qt
 
-    if not has_display():
-        raise InputError("there is no display; use --screenshot, --demo or --measure, which need none")
+    require_display()
     app = make_application()
+
+    from naisr_viewer.program.interrupts import ending_at_once
+
     window, controller = make_window(engine)
-    signal.signal(signal.SIGINT, signal.SIG_DFL)  # so that Ctrl+C in the terminal ends the program
     if (reading := first.reading) is not None:
         once = Qt.ConnectionType.SingleShotConnection
         controller.refinement.settled.connect(lambda: window.reading_requested.emit(reading), once)
-    show(window, controller, first, pixels)
-    return app.exec()
+    with ending_at_once():
+        show(window, controller, first, pixels)
+        return app.exec()
 
 
 def show(window: MainWindow, controller: Controller, first: First, pixels: tuple[int, int]) -> None:
@@ -219,8 +231,12 @@ def require_one_label(engine: Engine, reading: Reading | None) -> None:
 def own_window(engine: Engine) -> Iterator[tuple[MainWindow, Controller]]:
     """A window that leaves no trace in the user's settings, closed at the end."""
     make_application()
-    with TemporaryDirectory(prefix="naisr-viewer-") as folder:
-        window, controller = make_window(engine, Path(folder) / "settings.ini")
+
+    from naisr_viewer.program.interrupts import ending_at_once
+
+    folder = TemporaryDirectory(prefix="naisr-viewer-")
+    with folder, ending_at_once(folder.cleanup):
+        window, controller = make_window(engine, Path(folder.name) / "settings.ini")
         try:
             yield window, controller
         finally:

@@ -7,6 +7,7 @@ A population module offers ``visits(seed, patients)``, ``visit_shape(visit)``, `
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
@@ -89,6 +90,25 @@ def require_size(seed: int, patients: int) -> None:
         raise InputError(f"{patients} patients were asked for; give at least 1, at most {MOST_PATIENTS}")
     if not 0 <= seed < 2**32:
         raise InputError(f"the seed is {seed}; give 0 or more, up to {2**32 - 1}")
+
+
+def require_own(out: Path, name: str) -> None:
+    """Make sure that a folder holds no table but one of the same population, which writing it replaces.
+
+    Raises:
+        InputError: when it does, or is a file.
+    """
+    if out.exists() and not out.is_dir():
+        raise InputError(f"'{out}' is a file; give the name of a folder to write into")
+    if any((out / file).exists() for file in ("data.csv", "data.toml")) and _population_in(out) != name:
+        raise InputError(f"{out} holds a table of something else; give another folder")
+
+
+def _population_in(folder: Path) -> str | None:
+    try:
+        return str(tomllib.loads((folder / "data.toml").read_text(encoding="utf-8"))["source"]["population"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
 
 
 def population(name: str) -> PopulationModule:

@@ -253,8 +253,8 @@ def _csv(rows: list[list[str]]) -> bytes:
 
 def _write_visit(out: Path, visit: Visit) -> None:
     mesh, landmarks = _in_scanner(visit)
-    with replacing(out / _mesh_name(visit)) as temporary:
-        mesh.export(temporary, encoding="binary")
+    with replacing(out / _mesh_name(visit)) as temporary, temporary.open("wb") as file:
+        mesh.export(file, file_type="ply", encoding="binary")
     points = [[name, *(f"{value:.6f}" for value in point)] for name, point in landmarks.items()]
     _write(out / _landmarks_name(visit), _csv([["name", "x", "y", "z"], *points]))
 

@@ -265,8 +265,8 @@ def write_population(
     people = visits(seed, patients)
     meshes = [f"meshes/{person.subject}.ply" for person in people]
     for (person, mesh), _ in progress.over(list(zip(people, meshes, strict=True))):
-        with replacing(out / mesh) as temporary:
-            visit_shape(person)[0].export(temporary, encoding="binary")
+        with replacing(out / mesh) as temporary, temporary.open("wb") as file:
+            visit_shape(person)[0].export(file, file_type="ply", encoding="binary")
     source = f'\n[source]\npopulation = "bodies"\nseed = {seed}\npatients = {patients}\n'
     with replacing(out / "data.toml") as temporary:
         temporary.write_text('name = "bodies"\n\n' + COVARIATES_TOML + source, encoding="utf-8")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import io
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from types import MappingProxyType
 from zipfile import ZipFile
@@ -13,7 +15,7 @@ import torch
 from naisr_model import checkpoint as checkpoints
 from naisr_model.checkpoint import Checkpoint
 from naisr_model.errors import InputError
-from naisr_model.files import replacing
+from naisr_model.files import checked_place, forget_unfinished, replacing
 from naisr_model.learning.training.residual import residual_latents
 from naisr_model.learning.training.task import State, Task
 from naisr_model.models.base import DeformableModel, deformable
@@ -22,13 +24,44 @@ from naisr_model.surface.folding import folded_shares
 from naisr_model.surface.isosurface import isosurface
 from naisr_model.surface.lattice import Lattice
 from naisr_model.surface.sparse import evaluate_band
+from naisr_model.work.alone import alone
 
 FOLDING_SHAPES = 20
 """Training shapes whose surfaces are looked at for folds."""
 
 
+@contextmanager
+def held(task: Task) -> Iterator[None]:
+    """The files of a training to itself until it ends, without what a killed run left half written.
+
+    Raises:
+        InputError: when something else stands at ``out``, or another training writes there.
+    """
+    checked_place(task.out)
+    if task.out.exists() and not _state_file(task).exists():
+        raise InputError(
+            f"{task.out} is there already, and no training that could go on belongs to it; "
+            "give another --out, or move it away"
+        )
+    told = f"another training writes {task.out}; wait until it has ended, or give another --out"
+    with alone(task.folder / ".lock", told):
+        forget_unfinished(task.out)
+        forget_unfinished(_state_file(task))
+        yield
+
+
 def save(state: State, task: Task, figures: Mapping[str, float] = MappingProxyType({})) -> Checkpoint:
-    """Write the atlas, and the state to go on from; ``figures`` stand in the atlas beside the iterations."""
+    """Write the state to go on from, and the atlas; ``figures`` stand in the atlas beside the iterations.
+
+    The state comes first: an atlas without one belongs to somebody else.
+
+    Raises:
+        InputError: when they cannot be written; what was saved before is whole.
+    """
+    record = io.BytesIO()  # torch says in words of its own that a disk is full
+    torch.save(state.to_dict() | {"fingerprint": task.fingerprint}, record)
+    with replacing(_state_file(task)) as temporary:
+        temporary.write_bytes(record.getbuffer())
     store = task.store
     checkpoint = Checkpoint(
         name=store.name,
@@ -42,8 +75,6 @@ def save(state: State, task: Task, figures: Mapping[str, float] = MappingProxyTy
         training={"iterations": state.iteration, "seconds": round(state.seconds, 1), **figures},
     )
     checkpoints.save(task.out, checkpoint)
-    with replacing(task.folder / "state.pt") as temporary:
-        torch.save(state.to_dict() | {"fingerprint": task.fingerprint}, temporary)
     return checkpoint
 
 
@@ -53,9 +84,7 @@ def resume(state: State, task: Task) -> None:
     Raises:
         InputError: for a state that cannot be read, or is of other settings or data.
     """
-    path = task.folder / "state.pt"
-    for left_over in task.folder.glob(".state.*.pt"):  # of a program that was killed while it saved
-        left_over.unlink()
+    path = _state_file(task)
     if not path.exists():
         return
     try:
@@ -69,12 +98,13 @@ def resume(state: State, task: Task) -> None:
     except Exception as error:  # torch raises whatever it likes on damaged files
         reason = (str(error).splitlines() or [repr(error)])[0]
         raise InputError(
-            f"the training's state {path} cannot be read ({reason}); delete {task.folder} to start again"
+            f"the training's state {path} cannot be read ({reason}); delete its folder and {task.out.name} "
+            "to start again"
         ) from error
     if not same:
         raise InputError(
-            f"{task.folder} holds a training with other settings or data; delete it to start again, "
-            f"or give another --out"
+            f"{task.folder} holds a training with other settings or data; delete it and {task.out.name} to "
+            "start again, or give another --out"
         )
 
 
@@ -99,8 +129,9 @@ def keep_template(state: State, task: Task) -> None:
         evaluate_band(template_field(deformable(state.model)), lattice), lattice, task.store.frame
     )
     if len(mesh.faces):
-        with replacing(task.folder / "templates" / f"epoch_{epoch:05d}.ply") as temporary:
-            mesh.export(temporary)
+        path = task.folder / "templates" / f"epoch_{epoch:05d}.ply"
+        with replacing(path) as temporary, temporary.open("wb") as file:
+            mesh.export(file, file_type="ply")
 
 
 def measured(state: State, task: Task) -> dict[str, float]:
@@ -109,6 +140,10 @@ def measured(state: State, task: Task) -> dict[str, float]:
         return {}
     share = _folded_share(state.model, state, task)
     return {} if np.isnan(share) else {"folded_share": share}
+
+
+def _state_file(task: Task) -> Path:
+    return task.folder / "state.pt"
 
 
 def _folded_share(model: DeformableModel, state: State, task: Task) -> float:

@@ -15,7 +15,7 @@ from naisr_model.checkpoint import Checkpoint
 from naisr_model.config import Preset
 from naisr_model.data.store import SampleStore
 from naisr_model.errors import Cancelled, InputError
-from naisr_model.learning.training.kept import keep_template, measured, resume, save
+from naisr_model.learning.training.kept import held, keep_template, measured, resume, save
 from naisr_model.learning.training.report import Log, Report
 from naisr_model.learning.training.step import accumulate_gradients
 from naisr_model.learning.training.task import State, Task, initial_state, make_task
@@ -56,11 +56,16 @@ def train(
         The checkpoint that was written.
 
     Raises:
-        InputError: when settings and data do not fit, or when the loss becomes NaN or breaks away; the
-            last good state is kept.
+        InputError: when settings and data do not fit, something else stands at ``out`` or writes there, it
+            cannot be written, or the loss becomes NaN or breaks away; the last good state is kept.
         Cancelled: when nobody waits for it any more; the state reached is kept.
     """
     task = make_task(store, preset, out, time_budget_s, device)
+    with held(task):
+        return _train(task, report, progress)
+
+
+def _train(task: Task, report: Callable[[Report], None] | None, progress: Progress) -> Checkpoint:
     state = initial_state(task)
     resume(state, task)
     first, began, saved = state.iteration, time.monotonic(), time.monotonic()

@@ -1,4 +1,8 @@
-"""How what draws the shapes is brought in: behind the window, because VTK takes a while."""
+"""How what draws the shapes is brought in: behind the window, because VTK takes a while.
+
+VTK is loaded in a thread. Whatever touches Qt is loaded in the window's thread: now and then the program died
+where it was loaded beside a running window.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +21,10 @@ if TYPE_CHECKING:
     from naisr_viewer.views.shapes.canvas import Canvas
 
 DRAWING = "naisr_viewer.views.shapes.canvas"
-"""The module that draws."""
+"""The module that draws, with Qt."""
+
+LIBRARY = "pyvista.plotting"
+"""What it draws by: nearly all that takes time, and it knows no Qt."""
 
 
 def reserve_opengl(widget: QWidget) -> None:
@@ -40,7 +47,7 @@ class Drawing(QObject):
 
     arrived = Signal()  # from now on a canvas can be made
 
-    _imported = Signal()  # from the thread: the module has been imported
+    _imported = Signal()  # from the thread: the library has been imported
 
     def __init__(self, parent: QObject) -> None:
         super().__init__(parent)
@@ -68,7 +75,7 @@ class Drawing(QObject):
     def _import(self) -> None:
         """In a thread of its own; an error is met again, and told, when the canvas is taken."""
         with suppress(ImportError):
-            import_module(DRAWING)
+            import_module(LIBRARY)
         self._imported.emit()
 
     def _take(self) -> None:

@@ -126,6 +126,31 @@ def test_a_bar_is_there_once_the_work_goes_on(naisr, tmp_path):
     assert code == 0 and "writing bodies" in error and "100 %" in error
 
 
+def test_a_population_replaces_nobody_elses_table(naisr, tmp_path):
+    out, words = tmp_path / "people", ("--patients", 2)
+    assert naisr("populate", "airway", out, *words)[0] == naisr("populate", "airway", out, *words)[0] == 0
+    before = (out / "data.csv").read_bytes()
+    code, _, error = naisr("populate", "bodies", out, *words)
+    assert code == 2 and "holds a table of something else; give another folder" in error
+    assert (out / "data.csv").read_bytes() == before
+    (tmp_path / "data.csv").write_text("precious")
+    assert naisr("populate", "airway", tmp_path, *words)[0] == 2
+    assert (tmp_path / "data.csv").read_text() == "precious"
+
+
+def test_figures_replace_no_other_file(naisr, egg_atlas, egg_table, tmp_path):
+    scan, there = egg_table.parent / "egg0.stl", tmp_path / "table.csv"
+    there.write_text("subject,age\n")
+    for target, told in (
+        (there, "holds no figures; give another file"),
+        (tmp_path, "is a folder"),
+        (there / "x.json", "is a file, no folder"),
+    ):
+        code, out, error = naisr("fit", scan, "--atlas", egg_atlas, "--json", target)
+        assert (code, out) == (2, "") and told in error and error.count("\n") == 1
+    assert there.read_text() == "subject,age\n"
+
+
 def test_ctrl_c_stops_also_where_a_library_swallows_it(naisr, egg_atlas, monkeypatch):
     def swallowing(_path):
         try:

@@ -324,3 +324,53 @@ def test_a_killed_run_goes_on_to_the_same_store(cohort, tmp_path):
     assert len(report.skipped) == len(done)
     prepare(cohort, whole, options=SMALL)
     assert contents(cut) == contents(whole)
+
+
+def test_the_store_of_another_table_is_left_alone(cohort, tmp_path):
+    out, other = tmp_path / "store", tmp_path / "other.csv"
+    prepare(cohort, out, options=SMALL)
+    before = contents(out)
+    other.write_text(cohort.read_text())
+    with pytest.raises(InputError, match=r"holds the store of '.*', not of 'other'; give another --out"):
+        prepare(other, out, options=SMALL)
+    assert contents(out) == before
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "report.json").write_text("{}")
+    with pytest.raises(InputError, match=r"holds a report\.json of something else; give another --out"):
+        prepare(cohort, tmp_path / "mine", options=SMALL)
+    assert [path.name for path in (tmp_path / "mine").iterdir()] == ["report.json"]
+
+
+def test_a_second_run_on_the_same_store_is_told(cohort, tmp_path):
+    told: list[object] = []
+
+    def second(_share: float) -> None:
+        if not told:
+            with pytest.raises(
+                InputError, match=r"another run prepares .*; wait until it has ended"
+            ) as error:
+                prepare(cohort, tmp_path / "store", options=SMALL)
+            told.append(error)
+
+    assert prepare(cohort, tmp_path / "store", options=SMALL, progress=Progress(second)).accepted
+    assert told and not (tmp_path / "store" / ".lock").exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there is no limit for files")
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_store_that_finds_no_room_leaves_nothing_half_done_and_goes_on_later(cohort, tmp_path, workers):
+    """A limit for the size of files stands for a full disk; other processes get it from this one."""
+    import resource
+
+    out, options = tmp_path / "store", replace(SMALL, workers=workers)
+    hard = resource.getrlimit(resource.RLIMIT_FSIZE)[1]
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4_000, hard))
+    try:
+        with pytest.raises(InputError, match=r"cannot write .*store.*: File too large; "):
+            prepare(cohort, out, options=options)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (hard, hard))
+    assert [path.name for path in out.rglob("*") if path.is_file() or path.name.startswith(".")] == []
+    prepare(cohort, out, options=options)
+    prepare(cohort, tmp_path / "whole", options=options)
+    assert contents(out) == contents(tmp_path / "whole")

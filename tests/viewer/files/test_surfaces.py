@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -84,6 +85,23 @@ def test_a_failed_write_leaves_the_old_file_and_no_rubbish(tmp_path):
         export.write_atomically(path, fail)
     assert path.read_text() == "the old one"
     assert os.listdir(tmp_path) == ["shape.stl"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there is no limit for files")
+@pytest.mark.parametrize("ending", FORMATS)
+def test_a_surface_that_finds_no_room_is_a_sentence_and_leaves_nothing(result, card, tmp_path, ending):
+    """A limit for the size of files stands for a full disk."""
+    import resource
+
+    hard = resource.getrlimit(resource.RLIMIT_FSIZE)[1]
+    out = tmp_path / "out"
+    resource.setrlimit(resource.RLIMIT_FSIZE, (2_000, hard))
+    try:
+        with pytest.raises(InputError, match=rf"cannot write .*shape\.{ending}: File too large; "):
+            export.write_surface(out / f"shape.{ending}", result, card)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (hard, hard))
+    assert os.listdir(out) == []
 
 
 def test_nothing_and_nonsense_are_refused_in_words(result, card, atlas, engine, tmp_path, monkeypatch):

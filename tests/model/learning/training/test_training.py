@@ -3,6 +3,7 @@
 import dataclasses
 import itertools
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -109,6 +110,56 @@ def test_other_data_do_not_continue_a_training(egg_store, tmp_path):
     population = dataclasses.replace(egg_store.population, values=egg_store.population.values[::-1].copy())
     with pytest.raises(InputError, match="other settings or data"):
         train(dataclasses.replace(egg_store, population=population), preset, out)
+
+
+def test_what_no_training_made_is_left_alone(egg_store, egg_table, egg_atlas, tmp_path):
+    table, atlas = tmp_path / "table.csv", tmp_path / "given.safetensors"
+    shutil.copy(egg_table, table)
+    shutil.copy(egg_atlas, atlas)
+    for out in (table, atlas):
+        before = out.read_bytes()
+        with pytest.raises(InputError, match=r"is there already, and no training .* give another --out"):
+            train(egg_store, egg_preset(epochs=1), out)
+        assert out.read_bytes() == before
+    assert sorted(os.listdir(tmp_path)) == ["given.safetensors", "table.csv"]
+    with pytest.raises(InputError, match="is a folder; give the name of a file"):
+        train(egg_store, egg_preset(epochs=1), tmp_path)
+
+
+def test_a_second_training_of_the_same_atlas_is_told(egg_store, tmp_path):
+    out, told = tmp_path / "a.safetensors", []
+
+    def second(_report: training.Report) -> None:
+        with pytest.raises(InputError, match=r"another training writes .* wait until it has ended") as error:
+            train(egg_store, egg_preset(epochs=1), out)
+        told.append(error)
+
+    train(egg_store, egg_preset(epochs=1), out, report=second)
+    assert told and not (out.with_name("a.safetensors.training") / ".lock").exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there is no limit for files")
+def test_a_training_that_finds_no_room_keeps_what_it_saved_and_goes_on_later(egg_store, tmp_path):
+    """A limit for the size of files stands for a full disk."""
+    import resource
+
+    out, preset = tmp_path / "a.safetensors", egg_preset(epochs=4)
+    whole = train(egg_store, preset, tmp_path / "whole.safetensors")
+    seen: list[training.Report] = []
+    with pytest.raises(Cancelled):
+        stop = Progress(is_unwanted=lambda: len(seen) == 3)
+        train(egg_store, preset, out, report=seen.append, progress=stop)
+    hard = resource.getrlimit(resource.RLIMIT_FSIZE)[1]
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4_000, hard))
+    try:
+        with pytest.raises(InputError, match=r"cannot write .*state\.pt: File too large; "):
+            train(egg_store, preset, out)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (hard, hard))
+    assert load(out).training["iterations"] == 3
+    left = [path.name for path in tmp_path.rglob(".*")]
+    assert left == []
+    assert same(train(egg_store, preset, out), whole)
 
 
 def test_settings_that_do_not_fit_are_refused(egg_store, tmp_path):
