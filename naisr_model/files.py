@@ -35,6 +35,19 @@ def replacing(path: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+Stamp = tuple[int, int] | None
+"""When a file was written (ns) and its size; None where there is none."""
+
+
+def stamp_of(path: Path) -> Stamp:
+    """What changes when a file is written."""
+    try:
+        facts = path.stat()
+    except OSError:
+        return None
+    return facts.st_mtime_ns, facts.st_size
+
+
 def sources_digest(*folders: Path) -> bytes:
     """SHA-256 of the Python sources in some folders: another one is another program, whatever its version."""
     sources = [file for folder in folders for file in sorted(folder.rglob("*.py"))]

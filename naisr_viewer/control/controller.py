@@ -3,32 +3,36 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType, TracebackType
 
-from PySide6.QtCore import QObject
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtGui import QCloseEvent
 
 from naisr_model.errors import InputError
 from naisr_viewer import __version__
 from naisr_viewer.control import jobs
 from naisr_viewer.control.preferences import Preferences
 from naisr_viewer.control.preparation import Preparation
+from naisr_viewer.control.questions import Questions
 from naisr_viewer.control.refinement import Refinement
 from naisr_viewer.control.worker import Worker
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.files.exports import in_the_way, planned
 from naisr_viewer.files.surfaces import write_atomically
 from naisr_viewer.panels.kinds import with_layout_of
-from naisr_viewer.state.atlas_card import AtlasCard, RealVector
+from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState, followed, opened, reset, reset_all, with_value
-from naisr_viewer.state.history import History, record, redo, undo
+from naisr_viewer.state.history import History, persons, record, redo, undo
 from naisr_viewer.state.layouts import Layout, Panel
+from naisr_viewer.state.questions import CLOSE_WINDOW, OPEN_ATLAS, REPLACE_FILES
 from naisr_viewer.state.requests import ExportChoice, SurfaceResult
 from naisr_viewer.state.theme import ThemeChoice
 from naisr_viewer.views.main_window import MainWindow
 from naisr_viewer.words.numbers import in_words
+from naisr_viewer.words.questions import at_stake, in_the_place_of
 
 
 class Controller(QObject):
@@ -39,12 +43,16 @@ class Controller(QObject):
         engine: computes surfaces.
         worker: runs the engine beside the window.
         background: does what nobody waits for.
-        preferences: recent files and the theme.
+        preferences: recent files, the theme, and what is asked.
+        is_attended: whether somebody sits there who can be asked.
 
     Attributes:
         state: what is being explored.
         refinement: brings the screen to it.
+        questions: what is asked before it cannot be taken back.
     """
+
+    travelled = Signal()  # an act was undone or done again
 
     def __init__(
         self,
@@ -53,13 +61,16 @@ class Controller(QObject):
         worker: Worker,
         background: Worker,
         preferences: Preferences,
+        is_attended: bool = True,
     ) -> None:
         super().__init__()
         self.state = ExplorerState()
+        self.questions = Questions(window, preferences, is_attended)
         self.refinement = Refinement(window, engine, worker)
         self._preparation = Preparation(window, engine, self.refinement, background)
         self._window, self._engine, self._preferences = window, engine, preferences
         self._history = History()
+        self._held: frozenset[int] = frozenset()
         self._before_move: ExplorerState | None = None
         self._connect()
         window.show_recent(preferences.recent)
@@ -82,20 +93,27 @@ class Controller(QObject):
         return self._before_move is not None
 
     def open(self, path: Path) -> None:
-        """Read an atlas beside the window and show it at its population mean."""
+        """Read an atlas beside the window and show it at its population mean.
+
+        Where patients are open it is asked first: they belong to the atlas that is left.
+        """
+        if (lost := at_stake(self.state.patients)) and not self.questions.agrees(OPEN_ATLAS, *lost):
+            return
         self._window.show_opening(path.name)
         job = jobs.opening(self._engine, path.absolute())
         self.refinement.run(f"Opening {path.name} …", job, self.show_atlas)
 
     def show_atlas(self, card: AtlasCard, values: Mapping[str, float] = MappingProxyType({})) -> None:
         """Show an atlas that is open in the engine; covariates left out are at their mean."""
-        self._leave()
+        self._finish_move()
         self._preferences.remember(card.path)
         self._window.show_recent(self._preferences.recent)
         state = opened(self.state, card)
         for name, value in values.items():
             state = with_value(state, name, value)
+        self._history = History()
         self.go(state)
+        self._release()
 
     def export(self, choice: ExportChoice, replaces: bool = False) -> None:
         """Write surfaces at the present values; what is missing is computed first.
@@ -108,15 +126,21 @@ class Controller(QObject):
         if atlas is None:
             return
         plan = planned(self.state, choice)
-        others = [] if replaces else in_the_way(plan)
-        if others and not self._window.ask_replace(others):
+        if not (replaces or self._may_replace(in_the_way(plan))):
             return
         job = jobs.exporting(self._engine, atlas, plan, choice)
         told = f"Exporting into {choice.folder} …"
         self.refinement.run(told, job, lambda report: self.refinement.tell(report.sentence))
 
-    def save_screenshot(self, path: Path) -> None:
-        """Write a picture of the whole window; the ending of ``path`` says which kind."""
+    def save_screenshot(self, path: Path, replaces: bool = False) -> None:
+        """Write a picture of the whole window; the ending of ``path`` says which kind.
+
+        Args:
+            path: where it goes.
+            replaces: whether a file that is there already is replaced without a question.
+        """
+        if not (replaces or self._may_replace([path] if path.exists() else [])):
+            return
         image = self._window.grab_image()
 
         def write(place: Path) -> None:
@@ -142,23 +166,28 @@ class Controller(QObject):
         before = self._before_move or self.state
         self._before_move = None
         self._window.shapes.set_moving(False)
-        self._commit(before, self._moved(before, name, value))
+        state = self._moved(before, name, value)
+        self._history = record(self._history, before, state)
+        self.go(state)
+        self._release()
 
     def reset(self, name: str) -> None:
         """One covariate to the patient's value, or to the population mean."""
-        self._commit(self.state, reset(self.state, name))
+        self.commit(reset(self.state, name))
 
     def reset_all(self) -> None:
         """All covariates to the patient's values, or to the population mean."""
-        self._commit(self.state, reset_all(self.state))
+        self.commit(reset_all(self.state))
 
     def undo(self) -> None:
-        """One change of the covariates back."""
-        self._travel(*undo(self._history, self.state.values))
+        """One act back: of the covariates, or of the patients with their readings and fits."""
+        self._finish_move()
+        self._travel(*undo(self._history, self.state))
 
     def redo(self) -> None:
-        """One change of the covariates forward again."""
-        self._travel(*redo(self._history, self.state.values))
+        """One act forward again."""
+        self._finish_move()
+        self._travel(*redo(self._history, self.state))
 
     def set_layout(self, layout: Layout) -> None:
         """Show other sub-plots."""
@@ -173,14 +202,22 @@ class Controller(QObject):
         self._preferences.set_theme(choice)
         self._window.show_theme(choice)
 
+    def commit(self, state: ExplorerState) -> None:
+        """Make ``state`` the present one, as one step to undo."""
+        self._finish_move()
+        state = with_layout_of(state)
+        self._history = record(self._history, self.state, state)
+        self.go(state)
+        self._release()
+
     def go(self, state: ExplorerState) -> None:
-        """Make ``state`` the present one, in a layout that its atlas has."""
+        """Make ``state`` the present one, in a layout that its atlas has; nothing is remembered."""
         state = with_layout_of(state)
         if (state.patient, state.person) != (self.state.patient, self.state.person):
-            self._leave()
+            self._finish_move()
         self.state = state
         self._window.show_state(state)
-        self._window.show_history(bool(self._history.past), bool(self._history.future))
+        self._window.show_history(self.is_moving or bool(self._history.past), bool(self._history.future))
         self._preparation.follow(state)
         self.refinement.follow(state, self.is_moving)
 
@@ -205,6 +242,8 @@ class Controller(QObject):
         window.theme_requested.connect(self.set_theme)
         window.cancel_requested.connect(self.refinement.cancel)
         window.about_requested.connect(lambda: window.show_about(__version__))
+        window.preferences_requested.connect(self.questions.change)
+        window.close_requested.connect(self._consider_closing)
         window.closing.connect(self.shutdown)
         window.covariates.value_moved.connect(self.move)
         window.covariates.value_settled.connect(self.settle)
@@ -212,21 +251,38 @@ class Controller(QObject):
         window.covariates.reset_all_requested.connect(self.reset_all)
         window.covariates.follow_toggled.connect(self.set_follow)
 
-    def _commit(self, before: ExplorerState, after: ExplorerState) -> None:
-        self._history = record(self._history, before.values, after.values)
-        self.go(after)
-
-    def _travel(self, history: History, values: RealVector) -> None:
+    def _travel(self, history: History, state: ExplorerState) -> None:
         self._history = history
-        self.go(replace(self.state, values=values))
+        self.go(state)
+        self.travelled.emit()
+
+    def _release(self) -> None:
+        """Forget the fits that no state refers to any more, neither the present one nor one remembered."""
+        held = persons(self._history, self.state)
+        for person in self._held - held:
+            self._engine.dismiss(person)
+        self._held = held
+
+    def _may_replace(self, files: Sequence[Path]) -> bool:
+        if not files or self.questions.agrees(REPLACE_FILES, *in_the_place_of(files)):
+            return True
+        if not self.questions.is_attended:
+            self._window.show_error(f"{files[0]} is there already; nothing was written.")
+        return False
+
+    def _consider_closing(self, event: QCloseEvent) -> None:
+        """Keep the window open where what would be lost is dear to its user."""
+        if (lost := at_stake(self.state.patients)) and not self.questions.agrees(CLOSE_WINDOW, *lost):
+            event.ignore()
 
     def _moved(self, before: ExplorerState, name: str, value: float) -> ExplorerState:
         state = with_value(self.state, name, value)
         return followed(state, name, before.values) if state.follow else state
 
-    def _leave(self) -> None:
-        """Another patient or atlas comes; what was done to the covariates so far ends here."""
-        self._history = History()
-        self._before_move = None
+    def _finish_move(self) -> None:
+        """Something else comes; a movement that has not come to rest ends where it is."""
         self._window.shapes.set_moving(False)
         self._window.covariates.forget_moves()
+        if self._before_move is not None:
+            before, self._before_move = self._before_move, None
+            self._history = record(self._history, before, self.state)

@@ -11,9 +11,10 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject
 
+from naisr_model.files import Stamp, stamp_of
 from naisr_viewer.control import jobs
 from naisr_viewer.control.controller import Controller
-from naisr_viewer.control.watch import FileWatch, Stamp, stamp_of
+from naisr_viewer.control.watch import FileWatch
 from naisr_viewer.engine.clinic import Clinic
 from naisr_viewer.state.explorer import showing, with_patient, without_patient
 from naisr_viewer.state.layouts import Layout
@@ -51,11 +52,11 @@ class PatientDesk(QObject):
         self._window, self._controller, self._clinic = window, controller, clinic
         self._keys = count(1)
         self._waiting: deque[Order] = deque()
-        self._stamps: dict[int, Stamp] = {}
         self._files = FileWatch(self)
         self._files.touched.connect(self._look_at_files)
         controller.refinement.settled.connect(self._read_next)
         controller.refinement.settled.connect(self._watch)
+        controller.travelled.connect(self._look_at_files)
         window.scan_requested.connect(self.open)
         panel = window.patients
         panel.patient_chosen.connect(self.show)
@@ -79,13 +80,12 @@ class PatientDesk(QObject):
         self._controller.go(showing(self._controller.state, key))
 
     def close(self, key: int) -> None:
-        """Forget a patient."""
+        """Take a patient from the list; undo brings it back, with its fit."""
         patient = self._controller.state.find(key)
         if patient is None:
             return
-        self._controller.go(without_patient(self._controller.state, key))
-        if patient.fit is not None:
-            self._clinic.forget(patient.fit)
+        self._controller.commit(without_patient(self._controller.state, key))
+        self._controller.refinement.tell(f"Closed {patient.name} · Ctrl+Z brings it back")
         self._watch()
 
     def read_differently(self, reading: Reading) -> None:
@@ -114,7 +114,7 @@ class PatientDesk(QObject):
 
     def compare(self, key: int | None) -> None:
         """Count changes from another patient; None for this patient as fitted."""
-        self._controller.go(replace(self._controller.state, compared=key))
+        self._controller.commit(replace(self._controller.state, compared=key))
 
     def set_ghost(self, has_ghost: bool) -> None:
         """Whether the scan is drawn over the full shape."""
@@ -157,14 +157,11 @@ class PatientDesk(QObject):
             self._read(replace(order, reading=replace(order.reading, label=chosen)))
 
     def _show_read(self, order: Order, stamp: Stamp, scan: Scan) -> None:
-        """A scan that was read differently has to be fitted again."""
+        """A scan that was read differently has to be fitted again; undo brings back how it was."""
         old = self._controller.state.find(order.key)
         name = old.name if old is not None else self._name(order.reading)
-        patient = OpenScan(order.key, name, order.reading, scan, order.known)
-        self._stamps[order.key] = stamp
-        self._controller.go(with_patient(self._controller.state, patient))
-        if old is not None and old.fit is not None:
-            self._clinic.forget(old.fit)
+        patient = OpenScan(order.key, name, order.reading, scan, order.known, written=stamp)
+        self._controller.commit(with_patient(self._controller.state, patient))
         self._watch()
         self._look_at_files()
 
@@ -176,9 +173,7 @@ class PatientDesk(QObject):
             return
         state = with_patient(self._controller.state, replace(patient, known=known, fit=fit))
         layout = Layout.FIT if patient.fit is None else state.layout
-        self._controller.go(replace(state, layout=layout))
-        if patient.fit is not None:
-            self._clinic.forget(patient.fit)
+        self._controller.commit(replace(state, layout=layout))
 
     def _known_of(self, reading: Reading) -> Named:
         """What is known of an open patient with the same file."""
@@ -200,7 +195,7 @@ class PatientDesk(QObject):
     def _look_at_files(self) -> None:
         state = self._controller.state
         patients = tuple(
-            replace(each, is_changed=stamp_of(each.reading.path) not in (None, self._stamps[each.key]))
+            replace(each, is_changed=stamp_of(each.reading.path) not in (None, each.written))
             for each in state.patients
         )
         if [each.is_changed for each in patients] != [each.is_changed for each in state.patients]:

@@ -65,12 +65,15 @@ def leave_a_core_to_the_window() -> None:
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 
-def make_window(engine: Engine, settings_file: Path | None = None) -> tuple[MainWindow, Controller]:
+def make_window(
+    engine: Engine, settings_file: Path | None = None, is_attended: bool = False
+) -> tuple[MainWindow, Controller]:
     """A window and what drives it; the application object exists already.
 
     Args:
         engine: computes the surfaces.
         settings_file: an INI file for recent files and theme instead of the user's own settings.
+        is_attended: whether somebody sits there who can be asked.
     """
     from PySide6.QtCore import QSettings
 
@@ -86,7 +89,7 @@ def make_window(engine: Engine, settings_file: Path | None = None) -> tuple[Main
     else:
         settings = QSettings(str(settings_file), QSettings.Format.IniFormat)
     window = MainWindow()
-    controller = Controller(window, engine, Worker(), Worker(), Preferences(settings))
+    controller = Controller(window, engine, Worker(), Worker(), Preferences(settings), is_attended)
     PatientDesk(window, controller, Clinic(engine))  # the controller owns it
     return window, controller
 
@@ -109,7 +112,7 @@ def attended(engine: Engine, first: First, pixels: tuple[int, int]) -> int:
     if not has_display():
         raise InputError("there is no display; use --screenshot, --demo or --measure, which need none")
     app = make_application()
-    window, controller = make_window(engine)
+    window, controller = make_window(engine, is_attended=True)
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # so that Ctrl+C in the terminal ends the program
     if (scan := first.scan) is not None:
         once = Qt.ConnectionType.SingleShotConnection

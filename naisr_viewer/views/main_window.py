@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from PySide6.QtCore import QSize, QTimer, Signal
@@ -13,6 +13,7 @@ from naisr_model.shipped import shipped
 from naisr_viewer.panels.kinds import visible_panels
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.patients import Labels
+from naisr_viewer.state.questions import Answer, Question
 from naisr_viewer.state.theme import ThemeChoice
 from naisr_viewer.views.actions import (
     COMMANDS,
@@ -32,7 +33,8 @@ from naisr_viewer.views.dialogs.documents import DocumentWindow
 from naisr_viewer.views.dialogs.export import ExportDialog
 from naisr_viewer.views.dialogs.files import ask_image_path, ask_open_path, ask_scan_path, dropped, is_atlas
 from naisr_viewer.views.dialogs.label import ask_label
-from naisr_viewer.views.dialogs.replace import ask_replace
+from naisr_viewer.views.dialogs.preferences import ask_preferences
+from naisr_viewer.views.dialogs.question import ask
 from naisr_viewer.views.patients.panel import PatientPanel
 from naisr_viewer.views.recent_menu import RecentMenu
 from naisr_viewer.views.shapes.shape_view import ShapeView
@@ -61,6 +63,8 @@ class MainWindow(QMainWindow):
     theme_requested = Signal(object)  # a ThemeChoice from the View menu
     cancel_requested = Signal()  # the cancel button beside the progress bar
     about_requested = Signal()  # Help > About
+    preferences_requested = Signal()  # Edit > Preferences…
+    close_requested = Signal(object)  # a QCloseEvent; who ignores it keeps the window open
     closing = Signal()  # the window is about to close
     appeared = Signal()  # the window has just been painted for the first time
 
@@ -205,9 +209,13 @@ class MainWindow(QMainWindow):
         if path is not None:
             self.screenshot_requested.emit(path)
 
-    def ask_replace(self, files: Sequence[Path]) -> bool:
-        """Whether files that are there already may be replaced."""
-        return ask_replace(self, files)
+    def ask(self, question: Question, text: str, detail: str) -> Answer:
+        """Whether something shall be done that cannot be undone."""
+        return ask(self, question, text, detail)
+
+    def ask_preferences(self, asked: Mapping[Question, bool]) -> dict[Question, bool] | None:
+        """Which questions shall be asked; None when nothing shall change."""
+        return ask_preferences(self, asked)
 
     def ask_label(self, labels: Labels) -> int | None:
         """Which label of a volume; None when nobody chose."""
@@ -218,7 +226,10 @@ class MainWindow(QMainWindow):
         return self.grab().toImage()
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Let the controller stop its work, then release what draws the shapes."""
+        """Unless it shall stay open, let the controller stop its work and release what draws the shapes."""
+        self.close_requested.emit(event)
+        if not event.isAccepted():
+            return
         self.closing.emit()
         self.shapes.clear()
         super().closeEvent(event)
