@@ -199,7 +199,7 @@ class MainWindow(QMainWindow):
     def ask_export(self) -> None:
         """Let surfaces be chosen and written."""
         assert self._state.atlas is not None
-        choice = ExportDialog(self._state.atlas, self).ask()
+        choice = ExportDialog(self._state, self).ask()
         if choice is not None:
             self.export_requested.emit(choice)
 

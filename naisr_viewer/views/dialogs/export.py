@@ -16,8 +16,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from naisr_viewer.panels.kinds import panels_in, title_of
-from naisr_viewer.state.atlas_card import AtlasCard
+from naisr_viewer.panels.kinds import panels_in, title_of, visible_panels
+from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Layout, Panel
 from naisr_viewer.state.requests import EXACT_RESOLUTION, FORMATS, ExportChoice
 from naisr_viewer.views.dialogs.pieces import buttons_of, column_in
@@ -25,17 +25,30 @@ from naisr_viewer.views.dialogs.pieces import buttons_of, column_in
 RESOLUTIONS = (64, EXACT_RESOLUTION, 192, 256)
 
 
-class ExportDialog(QDialog):
-    """Which surfaces, in which format, how fine and where to."""
+NOTE = (
+    "Millimetres. A record beside each file (.json) tells the covariates and the atlas. PLY and VTP also "
+    "hold the numbers that are shown as colours."
+)
 
-    def __init__(self, atlas: AtlasCard, parent: QWidget | None = None) -> None:
+
+class ExportDialog(QDialog):
+    """Which surfaces, in which format, how fine and where to.
+
+    Args:
+        state: what is on screen; there is an atlas.
+        parent: the window that waits.
+    """
+
+    def __init__(self, state: ExplorerState, parent: QWidget | None = None) -> None:
         super().__init__(parent)
+        assert state.atlas is not None
         self.setWindowTitle("Export surfaces")
         self.setMinimumWidth(460)
-        panels = panels_in(Layout.SIDE_BY_SIDE, atlas)
+        on_screen = visible_panels(state)
+        others = [each for each in panels_in(Layout.SIDE_BY_SIDE, state.atlas) if each not in on_screen]
         self.what = QComboBox(self)
-        self.what.addItem("All views", panels)
-        for panel in reversed(panels):
+        self.what.addItem("All views on screen", on_screen)
+        for panel in (*reversed(on_screen), *reversed(others)):
             self.what.addItem(title_of(panel), (panel,))
         self.format = QComboBox(self)
         self.format.addItems([name.upper() for name in FORMATS])
@@ -64,13 +77,13 @@ class ExportDialog(QDialog):
         where.addWidget(self.folder, 1)
         where.addWidget(browse)
         form = QFormLayout()
-        form.addRow("Surfaces", self.what)
-        form.addRow("Format", self.format)
-        form.addRow("Detail", self.detail)
-        form.addRow("Folder", where)
-        note = QLabel(
-            "Millimetres. A record beside each file (.json) tells the covariates and the atlas.", self
-        )
+        form.addRow("&Surfaces", self.what)
+        form.addRow("&Format", self.format)
+        form.addRow("&Detail", self.detail)
+        label = QLabel("F&older", self)
+        label.setBuddy(self.folder)
+        form.addRow(label, where)
+        note = QLabel(NOTE, self)
         note.setObjectName("muted")
         note.setWordWrap(True)
         column = column_in(self)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import pyvista as pv
 import trimesh
 from eggs import egg
 from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QTimer, QUrl
@@ -17,6 +18,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QMessageBox, QWidget
 
 from naisr_viewer.engine.engine import Engine
+from naisr_viewer.panels.kinds import visible_panels
 from naisr_viewer.program.start import make_window
 from naisr_viewer.state.history import UNDO_DEPTH
 from naisr_viewer.state.layouts import FULL_SHAPE, TEMPLATE, Layout, Panel
@@ -439,6 +441,47 @@ def test_an_export_says_whose_shape_it_is(fitted, qtbot, tmp_path):
     assert record["patient"]["known"] == {"age": 6.0, "sex": 1.0}
     mesh = trimesh.load_mesh(tmp_path / "out" / "eggs-p01-full-shape_age6_sexM.stl")
     assert mesh.volume / 1000 == pytest.approx(CUBIC_CM, rel=0.05)
+
+
+@pytest.mark.parametrize("layout", [Layout.FIT, Layout.CHANGE])
+def test_all_views_on_screen_are_exported_with_their_numbers(fitted, qtbot, tmp_path, layout):
+    _, controller = fitted
+    controller.set_layout(layout)
+    controller.settle("age", 8.5)
+    settle(qtbot, controller)
+    shown = dict(controller.shown)
+    panels = visible_panels(controller.state)
+    controller.export(ExportChoice(panels, "vtp", 64, tmp_path / "out"))
+    settle(qtbot, controller)
+    files = {path.name: path for path in (tmp_path / "out").glob("*.vtp")}
+    stems = {
+        Layout.FIT: ["full-shape_age8.5", "scan_age8.5", "uncertainty_age8.5", "deviation_age8.5"],
+        Layout.CHANGE: ["before_age6", "full-shape_age8.5", "change_age8.5_sexM_since_age6"],
+    }
+    assert set(files) == {f"eggs-p01-{stem}_sexM.vtp" for stem in stems[layout]}
+    for panel in panels:
+        (path,) = [
+            path for name, path in files.items() if f"-p01-{panel.kind.replace('shape', 'full')}" in name
+        ]
+        arrays, colouring = pv.read(path).point_data, shown[panel].colouring
+        record = json.loads(path.with_name(f"{path.name}.json").read_text())
+        assert record["patient"]["known"] == {"age": 6.0, "sex": 1.0}
+        if colouring is not None:
+            np.testing.assert_allclose(arrays[record["numbers"]["name"]], colouring.values)
+            assert record["numbers"]["in_file"]
+
+
+def test_an_export_that_cannot_hold_one_view_writes_none(ready, qtbot, tmp_path):
+    window, controller = ready
+    cloud = tmp_path / "p02.xyz"
+    np.savetxt(cloud, egg(6.0, 1.0).sample(4000, seed=0))
+    drop(window, cloud)
+    settle(qtbot, controller)
+    click(window.patients.known.fit)
+    settle(qtbot, controller)
+    controller.export(ExportChoice(visible_panels(controller.state), "stl", 64, tmp_path / "out"))
+    settle(qtbot, controller)
+    assert "cloud of points" in window.error_text.text() and not (tmp_path / "out").exists()
 
 
 def test_a_value_the_atlas_never_saw_is_not_turned_into_another(ready, qtbot, scan_file):
