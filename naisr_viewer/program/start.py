@@ -77,6 +77,7 @@ def make_window(
     """
     from PySide6.QtCore import QSettings
 
+    from naisr_viewer.control.atlas_watch import AtlasWatch
     from naisr_viewer.control.controller import Controller
     from naisr_viewer.control.desk import PatientDesk
     from naisr_viewer.control.preferences import Preferences
@@ -91,6 +92,7 @@ def make_window(
     window = MainWindow()
     controller = Controller(window, engine, Worker(), Worker(), Preferences(settings), is_attended)
     PatientDesk(window, controller, Clinic(engine))  # the controller owns it
+    AtlasWatch(controller)  # and this
     return window, controller
 
 

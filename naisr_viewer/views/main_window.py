@@ -103,6 +103,9 @@ class MainWindow(QMainWindow):
             self.setWindowTitle(f"{state.atlas.name} — {TITLE}")
             offer(COMMANDS, self._actions, state.atlas)
         self._centre.show_shapes(state.atlas is not None)
+        if state.is_atlas_changed != old.is_atlas_changed:  # what was dismissed stays so
+            name = state.atlas.path.name if state.atlas and state.is_atlas_changed else ""
+            self._centre.changed.show_changed(name)
         self.scale.setVisible(state.atlas is not None)
         self.covariates.show_values(state)
         self.patients.show_state(state)
@@ -190,6 +193,11 @@ class MainWindow(QMainWindow):
         if path is not None:
             self.open_requested.emit(path)
 
+    def _ask_again(self) -> None:
+        """Have the atlas opened that is open."""
+        if self._state.atlas is not None:
+            self.open_requested.emit(self._state.atlas.path)
+
     def ask_scan(self) -> None:
         """Let a patient's file be chosen and opened."""
         path = ask_scan_path(self)
@@ -272,6 +280,7 @@ class MainWindow(QMainWindow):
     def _connect(self) -> None:
         self._recent.file_chosen.connect(self.open_requested)
         self._centre.empty.open_requested.connect(self.ask_atlas)
+        self._centre.changed.reopen_requested.connect(self._ask_again)
         self.patients.open_requested.connect(self.ask_scan)
         self.cancel.clicked.connect(self.cancel_requested)
         self.shapes.scale_changed.connect(self.scale.set_scale)

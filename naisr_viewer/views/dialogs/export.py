@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from PySide6.QtWidgets import (
@@ -20,7 +21,7 @@ from naisr_viewer.panels.kinds import panels_in, title_of, visible_panels
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Layout, Panel
 from naisr_viewer.state.requests import EXACT_RESOLUTION, FORMATS, ExportChoice
-from naisr_viewer.views.dialogs.pieces import buttons_of, column_in
+from naisr_viewer.views.dialogs.pieces import buttons_of, column_in, enable_accept
 
 RESOLUTIONS = (64, EXACT_RESOLUTION, 192, 256)
 
@@ -63,7 +64,7 @@ class ExportDialog(QDialog):
     def choice(self) -> ExportChoice:
         """What the dialog says now."""
         panels: tuple[Panel, ...] = tuple(self.what.currentData())
-        folder = Path(self.folder.text()).expanduser()
+        folder = Path(os.path.expanduser(self.folder.text().strip())).absolute()
         return ExportChoice(panels, self.format.currentText().lower(), self.detail.currentData(), folder)
 
     def ask(self) -> ExportChoice | None:
@@ -89,7 +90,9 @@ class ExportDialog(QDialog):
         column = column_in(self)
         column.addLayout(form)
         column.addWidget(note)
-        column.addWidget(buttons_of(self, "Export"))
+        buttons = buttons_of(self, "Export")
+        column.addWidget(buttons)
+        self.folder.textChanged.connect(lambda text: enable_accept(buttons, bool(text.strip())))
 
     def _browse(self) -> None:
         name = QFileDialog.getExistingDirectory(self, "Export into", self.folder.text())

@@ -169,7 +169,7 @@ def test_units_and_colours_are_on_every_row(panel, card):
 def test_another_atlas_replaces_the_rows(panel, card, qtbot):
     old = panel.rows["age"]
     panel.show_atlas(card, LIGHT)
-    assert panel.rows["age"] is not old
+    assert panel.rows["age"] is not old and not old.isVisible()  # at once, not with the next event
     assert list(panel.rows) == ["age", "weight", "sex"]
 
 

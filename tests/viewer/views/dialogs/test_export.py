@@ -56,3 +56,16 @@ def test_a_cancelled_dialog_chooses_nothing(qtbot, state):
     qtbot.addWidget(dialog)
     QTimer.singleShot(0, lambda: QTest.keyClick(dialog, Qt.Key.Key_Escape))
     assert dialog.ask() is None
+
+
+def test_a_folder_is_named_before_anything_is_written(qtbot, state, monkeypatch, tmp_path):
+    dialog = ExportDialog(state)
+    qtbot.addWidget(dialog)
+    (button,) = [each for each in dialog.findChildren(QPushButton) if each.text() == "Export"]
+    dialog.folder.setText("  ")
+    assert not button.isEnabled()
+    monkeypatch.chdir(tmp_path)
+    for typed, folder in (("out", tmp_path / "out"), ("~/x", Path.home() / "x"), ("~nobody?/x", None)):
+        dialog.folder.setText(typed)
+        assert button.isEnabled()
+        assert dialog.choice().folder == (folder or tmp_path / "~nobody?" / "x")
