@@ -26,7 +26,7 @@ def ask(parent: QWidget, question: Question, text: str, detail: str) -> Answer:
     is_last = QCheckBox("&Don't ask again", dialog)
     dialog.setCheckBox(is_last)
     go_on = dialog.addButton(f"&{question.go_on}", QMessageBox.ButtonRole.DestructiveRole)
-    dialog.setDefaultButton(dialog.addButton(QMessageBox.StandardButton.Cancel))
+    dialog.setDefaultButton(dialog.addButton("Cancel", QMessageBox.ButtonRole.RejectRole))
     dialog.exec()
     answer = Answer(dialog.clickedButton() is go_on, is_last.isChecked())
     dialog.deleteLater()
