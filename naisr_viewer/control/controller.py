@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType, TracebackType
@@ -18,6 +18,7 @@ from naisr_viewer.control.preferences import Preferences
 from naisr_viewer.control.preparation import Preparation
 from naisr_viewer.control.questions import Questions
 from naisr_viewer.control.refinement import Refinement
+from naisr_viewer.control.timeline import Timeline
 from naisr_viewer.control.worker import Worker
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.files.exports import in_the_way, planned
@@ -25,14 +26,12 @@ from naisr_viewer.files.surfaces import write_atomically
 from naisr_viewer.panels.kinds import with_layout_of
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState, followed, opened, reset, reset_all, with_value
-from naisr_viewer.state.history import History, persons, record, redo, undo
 from naisr_viewer.state.layouts import Layout, Panel
-from naisr_viewer.state.questions import CLOSE_WINDOW, OPEN_ATLAS, REPLACE_FILES
+from naisr_viewer.state.questions import CLOSE_WINDOW, OPEN_ATLAS
 from naisr_viewer.state.requests import ExportChoice, SurfaceResult
 from naisr_viewer.state.theme import ThemeChoice
 from naisr_viewer.views.main_window import MainWindow
 from naisr_viewer.words.numbers import in_words
-from naisr_viewer.words.questions import at_stake, in_the_place_of
 
 
 class Controller(QObject):
@@ -69,8 +68,7 @@ class Controller(QObject):
         self.refinement = Refinement(window, engine, worker)
         self._preparation = Preparation(window, engine, self.refinement, background)
         self._window, self._engine, self._preferences = window, engine, preferences
-        self._history = History()
-        self._held: frozenset[int] = frozenset()
+        self._timeline = Timeline(engine)
         self._before_move: ExplorerState | None = None
         self._connect()
         window.show_recent(preferences.recent)
@@ -97,7 +95,7 @@ class Controller(QObject):
 
         Where patients are open it is asked first: they belong to the atlas that is left.
         """
-        if (lost := at_stake(self.state.patients)) and not self.questions.agrees(OPEN_ATLAS, *lost):
+        if not self.questions.may_lose(OPEN_ATLAS, self.state.patients):
             return
         self._window.show_opening(path.name)
         job = jobs.opening(self._engine, path.absolute())
@@ -111,9 +109,9 @@ class Controller(QObject):
         state = opened(self.state, card)
         for name, value in values.items():
             state = with_value(state, name, value)
-        self._history = History()
+        self._timeline.begin()
         self.go(state)
-        self._release()
+        self._timeline.release(self.state)
 
     def export(self, choice: ExportChoice, replaces: bool = False) -> None:
         """Write surfaces at the present values; what is missing is computed first.
@@ -126,7 +124,7 @@ class Controller(QObject):
         if atlas is None:
             return
         plan = planned(self.state, choice)
-        if not (replaces or self._may_replace(in_the_way(plan))):
+        if not (replaces or self.questions.may_replace(in_the_way(plan))):
             return
         job = jobs.exporting(self._engine, atlas, plan, choice)
         told = f"Exporting into {choice.folder} …"
@@ -139,7 +137,7 @@ class Controller(QObject):
             path: where it goes.
             replaces: whether a file that is there already is replaced without a question.
         """
-        if not (replaces or self._may_replace([path] if path.exists() else [])):
+        if not (replaces or self.questions.may_replace([path] if path.exists() else [])):
             return
         image = self._window.grab_image()
 
@@ -166,10 +164,7 @@ class Controller(QObject):
         before = self._before_move or self.state
         self._before_move = None
         self._window.shapes.set_moving(False)
-        state = self._moved(before, name, value)
-        self._history = record(self._history, before, state)
-        self.go(state)
-        self._release()
+        self._conclude(before, self._moved(before, name, value))
 
     def reset(self, name: str) -> None:
         """One covariate to the patient's value, or to the population mean."""
@@ -182,12 +177,14 @@ class Controller(QObject):
     def undo(self) -> None:
         """One act back: of the covariates, or of the patients with their readings and fits."""
         self._finish_move()
-        self._travel(*undo(self._history, self.state))
+        self.go(self._timeline.back(self.state))
+        self.travelled.emit()
 
     def redo(self) -> None:
         """One act forward again."""
         self._finish_move()
-        self._travel(*redo(self._history, self.state))
+        self.go(self._timeline.forward(self.state))
+        self.travelled.emit()
 
     def set_layout(self, layout: Layout) -> None:
         """Show other sub-plots."""
@@ -205,10 +202,7 @@ class Controller(QObject):
     def commit(self, state: ExplorerState) -> None:
         """Make ``state`` the present one, as one step to undo."""
         self._finish_move()
-        state = with_layout_of(state)
-        self._history = record(self._history, self.state, state)
-        self.go(state)
-        self._release()
+        self._conclude(self.state, with_layout_of(state))
 
     def go(self, state: ExplorerState) -> None:
         """Make ``state`` the present one, in a layout that its atlas has; nothing is remembered."""
@@ -217,7 +211,7 @@ class Controller(QObject):
             self._finish_move()
         self.state = state
         self._window.show_state(state)
-        self._window.show_history(self.is_moving or bool(self._history.past), bool(self._history.future))
+        self._window.show_history(self.is_moving or self._timeline.can_undo, self._timeline.can_redo)
         self._preparation.follow(state)
         self.refinement.follow(state, self.is_moving)
 
@@ -251,28 +245,14 @@ class Controller(QObject):
         window.covariates.reset_all_requested.connect(self.reset_all)
         window.covariates.follow_toggled.connect(self.set_follow)
 
-    def _travel(self, history: History, state: ExplorerState) -> None:
-        self._history = history
-        self.go(state)
-        self.travelled.emit()
-
-    def _release(self) -> None:
-        """Forget the fits that no state refers to any more, neither the present one nor one remembered."""
-        held = persons(self._history, self.state)
-        for person in self._held - held:
-            self._engine.dismiss(person)
-        self._held = held
-
-    def _may_replace(self, files: Sequence[Path]) -> bool:
-        if not files or self.questions.agrees(REPLACE_FILES, *in_the_place_of(files)):
-            return True
-        if not self.questions.is_attended:
-            self._window.show_error(f"{files[0]} is there already; nothing was written.")
-        return False
+    def _conclude(self, before: ExplorerState, after: ExplorerState) -> None:
+        self._timeline.record(before, after)
+        self.go(after)
+        self._timeline.release(after)
 
     def _consider_closing(self, event: QCloseEvent) -> None:
         """Keep the window open where what would be lost is dear to its user."""
-        if (lost := at_stake(self.state.patients)) and not self.questions.agrees(CLOSE_WINDOW, *lost):
+        if not self.questions.may_lose(CLOSE_WINDOW, self.state.patients):
             event.ignore()
 
     def _moved(self, before: ExplorerState, name: str, value: float) -> ExplorerState:
@@ -285,4 +265,4 @@ class Controller(QObject):
         self._window.covariates.forget_moves()
         if self._before_move is not None:
             before, self._before_move = self._before_move, None
-            self._history = record(self._history, before, self.state)
+            self._timeline.record(before, self.state)

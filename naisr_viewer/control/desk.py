@@ -137,7 +137,9 @@ class PatientDesk(QObject):
         return False
 
     def _read(self, order: Order) -> None:
-        """Read now, or when what is under way has ended."""
+        """Read now, or when what is under way has ended; of several files every error can be read."""
+        if not (self._waiting or self._controller.refinement.is_occupied):
+            self._controller.refinement.forget_errors()
         self._waiting.append(order)
         self._read_next()
 
@@ -148,7 +150,7 @@ class PatientDesk(QObject):
         order = self._waiting.popleft()
         path = order.reading.path
         job = jobs.reading(self._clinic, atlas.path, order.reading, order.known)
-        refinement.run(f"Reading {path.name} …", job, partial(self._has_read, order, stamp_of(path)))
+        refinement.go_on(f"Reading {path.name} …", job, partial(self._has_read, order, stamp_of(path)))
 
     def _has_read(self, order: Order, stamp: Stamp, found: Scan | Labels) -> None:
         if isinstance(found, Scan):

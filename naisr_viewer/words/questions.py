@@ -11,10 +11,8 @@ NAMED = 6
 """How many files or patients are named; the rest is counted."""
 
 
-def at_stake(patients: Sequence[OpenScan]) -> tuple[str, str] | None:
-    """What would be lost with the open patients, and their names; None where nothing would."""
-    if not patients:
-        return None
+def at_stake(patients: Sequence[OpenScan]) -> tuple[str, str]:
+    """What would be lost with the open patients, and their names."""
     fits = sum(patient.fit is not None for patient in patients)
     lost = ", ".join(_counted(count, thing) for count, thing in ((len(patients), "patient"), (fits, "fit")))
     told = lost if fits else lost.partition(",")[0]

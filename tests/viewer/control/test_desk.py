@@ -537,6 +537,20 @@ def test_several_scans_that_are_dropped_are_all_read(ready, qtbot, tmp_path):
     assert [each.name for each in controller.state.patients] == ["v0.ply", "v1.ply", "v2.ply"]
 
 
+def test_of_several_files_every_one_that_cannot_be_read_is_told_of(ready, qtbot, tmp_path):
+    window, controller = ready
+    for name in ("first.docx", "good.ply", "last.docx"):
+        egg(5.0, 1.0).export(tmp_path / name, file_type="ply")
+        drop(window, tmp_path / name)
+    qtbot.waitUntil(lambda: len(controller.state.patients) == 1, timeout=60_000)
+    settle(qtbot, controller)
+    told = window.error_text.text().replace("\u200b", "")
+    assert "first.docx" in told and "last.docx" in told
+    drop(window, tmp_path / "good.ply")  # another act
+    settle(qtbot, controller)
+    assert not window.error_text.text()
+
+
 def test_what_would_end_a_fit_rests_meanwhile(ready, qtbot, scan_file):
     window, controller = ready
     drop(window, scan_file)
