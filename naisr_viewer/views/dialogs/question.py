@@ -21,8 +21,7 @@ def ask(parent: QWidget, question: Question, text: str, detail: str) -> Answer:
     dialog.setIcon(QMessageBox.Icon.Warning)
     dialog.setWindowTitle(question.title)
     dialog.setTextFormat(Qt.TextFormat.PlainText)
-    dialog.setText(text)
-    dialog.setInformativeText(detail)
+    dialog.setText(f"{text}\n\n{detail}")  # as one: Qt takes an informative text for markup
     is_last = QCheckBox("&Don't ask again", dialog)
     dialog.setCheckBox(is_last)
     go_on = dialog.addButton(f"&{question.go_on}", QMessageBox.ButtonRole.DestructiveRole)

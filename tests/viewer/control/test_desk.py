@@ -398,7 +398,7 @@ def answer(button: str, seen: list[str], *, is_last: bool = False) -> None:
     def press() -> None:
         dialog = QApplication.activeModalWidget()
         assert isinstance(dialog, QMessageBox)
-        seen.append(f"{dialog.text()}\n{dialog.informativeText()}")
+        seen.append(dialog.text())
         dialog.checkBox().setChecked(is_last)
         (wanted,) = [each for each in dialog.buttons() if each.text().replace("&", "") == button]
         click(wanted)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QMessageBox, QPushButton, QWidget
+from PySide6.QtWidgets import QApplication, QLabel, QMessageBox, QPushButton, QWidget
 
 from naisr_viewer.state.questions import QUESTIONS, REPLACE_FILES, Answer
 from naisr_viewer.views.dialogs.preferences import PreferencesDialog, ask_preferences
@@ -39,7 +39,7 @@ def test_only_a_yes_goes_on(parent, button, goes_on, is_last):
     def answer() -> None:
         dialog = QApplication.activeModalWidget()
         assert isinstance(dialog, QMessageBox)
-        seen.append(f"{dialog.text()}\n{dialog.informativeText()}")
+        seen.append(dialog.text())
         if is_last:
             dialog.checkBox().click()
         if button:
@@ -50,12 +50,24 @@ def test_only_a_yes_goes_on(parent, button, goes_on, is_last):
 
     QTimer.singleShot(0, answer)
     assert ask(parent, REPLACE_FILES, *in_the_place_of(FILES)) == Answer(goes_on, is_last)
-    assert "These 8 files are there already, in /out:\neggs-0.stl" in seen[0] and "and 2 more" in seen[0]
+    assert "These 8 files are there already, in /out:\n\neggs-0.stl" in seen[0] and "and 2 more" in seen[0]
 
 
 def test_the_enter_key_does_nothing_that_cannot_be_undone(parent):
     QTimer.singleShot(0, lambda: press(Qt.Key.Key_Return))
     assert not ask(parent, REPLACE_FILES, *in_the_place_of(FILES)).goes_on
+
+
+def test_names_are_no_markup(parent):
+    def look() -> None:
+        dialog = QApplication.activeModalWidget()
+        assert isinstance(dialog, QMessageBox)
+        (label,) = [each for each in dialog.findChildren(QLabel) if "p01" in each.text()]
+        assert label.textFormat() is Qt.TextFormat.PlainText
+        QTest.keyClick(dialog, Qt.Key.Key_Escape)
+
+    QTimer.singleShot(0, look)
+    ask(parent, REPLACE_FILES, *in_the_place_of([Path("/out/<b>p01</b>.stl")]))
 
 
 def test_every_question_can_be_wanted_again(parent):
