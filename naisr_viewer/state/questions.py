@@ -13,7 +13,7 @@ class Question:
         name: in the user's settings.
         title: of the dialog.
         go_on: the button that goes on.
-        when: what the preferences say of it, after "Ask before".
+        when: what the preferences say of it, after "Ask before", with its key after ``&``.
         unattended: the answer where nobody can be asked.
     """
 
@@ -41,13 +41,13 @@ OPEN_ATLAS = Question(
     "open atlas",
     "Open another atlas",
     "Open",
-    "another atlas takes the place of open patients",
+    "&another atlas takes the place of open patients",
     unattended=True,
 )
 CLOSE_WINDOW = Question(
-    "close window", "Close the window", "Close", "the window is closed with open patients", unattended=True
+    "close window", "Close the window", "Close", "the &window is closed with open patients", unattended=True
 )
-REPLACE_FILES = Question("replace files", "Replace files", "Replace", "files are replaced", unattended=False)
+REPLACE_FILES = Question("replace files", "Replace files", "Replace", "&files are replaced", unattended=False)
 
 QUESTIONS = (OPEN_ATLAS, CLOSE_WINDOW, REPLACE_FILES)
 """All of them; the preferences list them."""

@@ -7,7 +7,7 @@ import re
 
 from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtGui import QFocusEvent, QKeyEvent, QWheelEvent
-from PySide6.QtWidgets import QLineEdit, QWidget
+from PySide6.QtWidgets import QLineEdit, QToolTip, QWidget
 
 from naisr_model.covariates import Covariate
 from naisr_viewer.words.numbers import decimals, written
@@ -93,13 +93,15 @@ class NumberBox(QLineEdit):
         self._take(min(max(start + steps * self.step, low), high))
 
     def finish(self) -> None:
-        """Take what was typed, if it can be taken."""
+        """Take what was typed, if it can be taken; else say why not, beside the box."""
         value = self.value
         if value is None:
             self._emptied()
         elif value == self._taken:
             self.put(value)
-        elif not self.complaint:
+        elif self.complaint:
+            QToolTip.showText(self.mapToGlobal(self.rect().bottomLeft()), self.toolTip(), self)
+        else:
             self._take(value)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:

@@ -8,7 +8,7 @@ import pytest
 from PySide6.QtCore import QLocale, QPoint, QPointF, Qt
 from PySide6.QtGui import QKeySequence, QShortcut, QWheelEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QLineEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QLineEdit, QToolTip, QVBoxLayout, QWidget
 
 from naisr_model.covariates import Covariate
 from naisr_viewer.views.actions import COMMANDS
@@ -86,6 +86,7 @@ def test_what_cannot_be_taken_stays_and_is_marked(stage, text):
     write(stage.box, text)
     assert stage.box.text() == text
     enter(stage.box)
+    assert QToolTip.isVisible() and "1 to 233 months" in QToolTip.text()  # without being hovered over
     stage.other.setFocus()
     assert stage.heard == [] and stage.box.text() == text
     assert stage.box.property("isWrong")
