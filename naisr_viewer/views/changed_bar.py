@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QWidget
 
 
 class ChangedBar(QFrame):
-    """Offers to open the atlas again, until it is dismissed."""
+    """Offers to open the atlas again, until that is put off."""
 
     reopen_requested = Signal()  # "Open again" was pressed
 
@@ -17,15 +17,15 @@ class ChangedBar(QFrame):
         self._text = QLabel(self)
         self._text.setTextFormat(Qt.TextFormat.PlainText)
         self._text.setWordWrap(True)
-        reopen, dismiss = QPushButton("Open again", self), QPushButton("Dismiss", self)
-        self.stops: list[QWidget] = [reopen, dismiss]
+        reopen, later = QPushButton("Open again", self), QPushButton("Not now", self)
+        self.stops: list[QWidget] = [reopen, later]
         reopen.clicked.connect(self.reopen_requested)
-        dismiss.clicked.connect(self.hide)
+        later.clicked.connect(self.hide)
         row = QHBoxLayout(self)
         row.setContentsMargins(16, 8, 12, 8)
         row.addWidget(self._text, 1)
         row.addWidget(reopen)
-        row.addWidget(dismiss)
+        row.addWidget(later)
         self.hide()
 
     def show_changed(self, name: str) -> None:

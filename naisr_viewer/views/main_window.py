@@ -103,7 +103,7 @@ class MainWindow(QMainWindow):
             self.setWindowTitle(f"{state.atlas.name} — {TITLE}")
             offer(COMMANDS, self._actions, state.atlas)
         self._centre.show_shapes(state.atlas is not None)
-        if state.is_atlas_changed != old.is_atlas_changed:  # what was dismissed stays so
+        if state.is_atlas_changed != old.is_atlas_changed:  # what was put off stays so
             name = state.atlas.path.name if state.atlas and state.is_atlas_changed else ""
             self._centre.changed.show_changed(name)
         self.scale.setVisible(state.atlas is not None)

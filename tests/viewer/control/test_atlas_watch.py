@@ -61,11 +61,11 @@ def test_a_replaced_atlas_is_told_of_and_opened_again(ready, qtbot, atlas_file):
     assert told(window) == [] and not controller.state.is_atlas_changed
 
 
-def test_what_was_dismissed_stays_away(ready, qtbot, atlas_file):
+def test_what_was_put_off_stays_away(ready, qtbot, atlas_file):
     window, controller = ready
     replace_file(atlas_file)
     qtbot.waitUntil(lambda: bool(told(window)), timeout=10_000)
-    press(window, "Dismiss")
+    press(window, "Not now")
     controller.settle("age", 150.0)
     qtbot.waitUntil(lambda: not controller.is_busy, timeout=30_000)
     assert told(window) == [] and controller.state.is_atlas_changed
