@@ -25,7 +25,7 @@ GLB_TO_MM: NDArray[np.float64] = np.array(
 
 
 def mesh_bytes(mesh_mm: trimesh.Trimesh, ending: MeshFormat) -> bytes:
-    """A surface in millimetres, z up, as the content of a file."""
+    """A surface in millimetres, z up, as the content of a file; PLY and VTP hold its vertex attributes."""
     if ending == "vtp":
         return _vtp(mesh_mm)
     if ending == "glb":
@@ -40,8 +40,13 @@ def _vtp(mesh_mm: trimesh.Trimesh) -> bytes:
     import pyvista
     from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
 
-    surface = pyvista.PolyData.from_regular_faces(np.asarray(mesh_mm.vertices, np.float32), mesh_mm.faces)
-    surface.point_data.active_normals = np.asarray(mesh_mm.vertex_normals, np.float32)
+    points_mm = np.asarray(mesh_mm.vertices, np.float32)
+    surface = pyvista.PolyData(points_mm)
+    if len(mesh_mm.faces):
+        surface = pyvista.PolyData.from_regular_faces(points_mm, mesh_mm.faces)
+        surface.point_data.active_normals = np.asarray(mesh_mm.vertex_normals, np.float32)
+    for name, numbers in mesh_mm.vertex_attributes.items():
+        surface.point_data[name] = numbers
     writer = vtkXMLPolyDataWriter()
     writer.SetInputData(surface)
     writer.SetDataModeToBinary()

@@ -143,6 +143,19 @@ def require_file(path: Path, kind: str) -> None:
     raise InputError(f"there is no file {path}; give the path of {kind}")
 
 
+Stamp = tuple[int, int] | None
+"""When a file was written (ns) and its size; None where there is none."""
+
+
+def stamp_of(path: Path) -> Stamp:
+    """What changes when a file is written."""
+    try:
+        facts = path.stat()
+    except OSError:
+        return None
+    return facts.st_mtime_ns, facts.st_size
+
+
 def sources_digest(*folders: Path) -> bytes:
     """SHA-256 of the Python sources in some folders: another one is another program, whatever its version."""
     sources = [file for folder in folders for file in sorted(folder.rglob("*.py"))]

@@ -8,24 +8,26 @@ from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType, TracebackType
 
-from PySide6.QtCore import QBuffer, QIODevice, QObject
-from PySide6.QtGui import QImage, QImageWriter
+from PySide6.QtCore import QBuffer, QIODevice, QObject, Signal
+from PySide6.QtGui import QCloseEvent, QImage, QImageWriter
 
 from naisr_model.errors import InputError
 from naisr_viewer import __version__
 from naisr_viewer.control import jobs
 from naisr_viewer.control.preferences import Preferences
 from naisr_viewer.control.preparation import Preparation
+from naisr_viewer.control.questions import Questions
 from naisr_viewer.control.refinement import Refinement
+from naisr_viewer.control.timeline import Timeline
 from naisr_viewer.control.worker import Worker
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.files.exports import in_the_way, planned
 from naisr_viewer.files.surfaces import write_atomically
 from naisr_viewer.panels.kinds import with_layout_of
-from naisr_viewer.state.atlas_card import AtlasCard, RealVector
+from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState, followed, opened, reset, reset_all, with_value
-from naisr_viewer.state.history import History, record, redo, undo
 from naisr_viewer.state.layouts import Layout, Panel
+from naisr_viewer.state.questions import CLOSE_WINDOW, OPEN_ATLAS
 from naisr_viewer.state.requests import ExportChoice, SurfaceResult
 from naisr_viewer.state.theme import ThemeChoice
 from naisr_viewer.views.main_window import MainWindow
@@ -40,12 +42,16 @@ class Controller(QObject):
         engine: computes surfaces.
         worker: runs the engine beside the window.
         background: does what nobody waits for.
-        preferences: recent files and the theme.
+        preferences: recent files, the theme, and what is asked.
+        is_attended: whether somebody sits there who can be asked.
 
     Attributes:
         state: what is being explored.
         refinement: brings the screen to it.
+        questions: what is asked before it cannot be taken back.
     """
+
+    travelled = Signal()  # an act was undone or done again
 
     def __init__(
         self,
@@ -54,13 +60,15 @@ class Controller(QObject):
         worker: Worker,
         background: Worker,
         preferences: Preferences,
+        is_attended: bool = True,
     ) -> None:
         super().__init__()
         self.state = ExplorerState()
+        self.questions = Questions(window, preferences, is_attended)
         self.refinement = Refinement(window, engine, worker)
         self._preparation = Preparation(window, engine, self.refinement, background)
         self._window, self._engine, self._preferences = window, engine, preferences
-        self._history = History()
+        self._timeline = Timeline(engine)
         self._before_move: ExplorerState | None = None
         self._connect()
         window.show_recent(preferences.recent)
@@ -83,20 +91,27 @@ class Controller(QObject):
         return self._before_move is not None
 
     def open(self, path: Path) -> None:
-        """Read an atlas beside the window and show it at its population mean."""
+        """Read an atlas beside the window and show it at its population mean.
+
+        Where patients are open it is asked first: they belong to the atlas that is left.
+        """
+        if not self.questions.may_lose(OPEN_ATLAS, self.state.patients):
+            return
         self._window.show_opening(path.name)
         job = jobs.opening(self._engine, path.absolute())
         self.refinement.run(f"Opening {path.name} …", job, self.show_atlas)
 
     def show_atlas(self, card: AtlasCard, values: Mapping[str, float] = MappingProxyType({})) -> None:
         """Show an atlas that is open in the engine; covariates left out are at their mean."""
-        self._leave()
+        self._finish_move()
         self._preferences.remember(card.path)
         self._window.show_recent(self._preferences.recent)
         state = opened(self.state, card)
         for name, value in values.items():
             state = with_value(state, name, value)
+        self._timeline.begin()
         self.go(state)
+        self._timeline.release(self.state)
 
     def export(self, choice: ExportChoice, replaces: bool = False) -> None:
         """Write surfaces at the present values; what is missing is computed first.
@@ -109,15 +124,21 @@ class Controller(QObject):
         if atlas is None:
             return
         plan = planned(self.state, choice)
-        others = [] if replaces else in_the_way(plan)
-        if others and not self._window.ask_replace(others):
+        if not (replaces or self.questions.may_replace(in_the_way(plan))):
             return
         job = jobs.exporting(self._engine, atlas, plan, choice)
         told = f"Exporting into {choice.folder} …"
         self.refinement.run(told, job, lambda report: self.refinement.tell(report.sentence))
 
-    def save_screenshot(self, path: Path) -> None:
-        """Write a picture of the whole window; the ending of ``path`` says which kind."""
+    def save_screenshot(self, path: Path, replaces: bool = False) -> None:
+        """Write a picture of the whole window; the ending of ``path`` says which kind.
+
+        Args:
+            path: where it goes.
+            replaces: whether a file that is there already is replaced without a question.
+        """
+        if not (replaces or self.questions.may_replace([path] if path.exists() else [])):
+            return
         try:
             content = _encoded(self._window.grab_image(), path)
             write_atomically(path, lambda place: place.write_bytes(content))
@@ -138,23 +159,27 @@ class Controller(QObject):
         before = self._before_move or self.state
         self._before_move = None
         self._window.shapes.set_moving(False)
-        self._commit(before, self._moved(before, name, value))
+        self._conclude(before, self._moved(before, name, value))
 
     def reset(self, name: str) -> None:
         """One covariate to the patient's value, or to the population mean."""
-        self._commit(self.state, reset(self.state, name))
+        self.commit(reset(self.state, name))
 
     def reset_all(self) -> None:
         """All covariates to the patient's values, or to the population mean."""
-        self._commit(self.state, reset_all(self.state))
+        self.commit(reset_all(self.state))
 
     def undo(self) -> None:
-        """One change of the covariates back."""
-        self._travel(*undo(self._history, self.state.values))
+        """One act back: of the covariates, or of the patients with their readings and fits."""
+        self._finish_move()
+        self.go(self._timeline.back(self.state))
+        self.travelled.emit()
 
     def redo(self) -> None:
-        """One change of the covariates forward again."""
-        self._travel(*redo(self._history, self.state.values))
+        """One act forward again."""
+        self._finish_move()
+        self.go(self._timeline.forward(self.state))
+        self.travelled.emit()
 
     def set_layout(self, layout: Layout) -> None:
         """Show other sub-plots."""
@@ -169,14 +194,19 @@ class Controller(QObject):
         self._preferences.set_theme(choice)
         self._window.show_theme(choice)
 
+    def commit(self, state: ExplorerState) -> None:
+        """Make ``state`` the present one, as one step to undo."""
+        self._finish_move()
+        self._conclude(self.state, with_layout_of(state))
+
     def go(self, state: ExplorerState) -> None:
-        """Make ``state`` the present one, in a layout that its atlas has."""
+        """Make ``state`` the present one, in a layout that its atlas has; nothing is remembered."""
         state = with_layout_of(state)
         if (state.patient, state.person) != (self.state.patient, self.state.person):
-            self._leave()
+            self._finish_move()
         self.state = state
         self._window.show_state(state)
-        self._window.show_history(bool(self._history.past), bool(self._history.future))
+        self._window.show_history(self.is_moving or self._timeline.can_undo, self._timeline.can_redo)
         self._preparation.follow(state)
         self.refinement.follow(state, self.is_moving)
 
@@ -201,6 +231,8 @@ class Controller(QObject):
         window.theme_requested.connect(self.set_theme)
         window.cancel_requested.connect(self.refinement.cancel)
         window.about_requested.connect(lambda: window.show_about(__version__))
+        window.preferences_requested.connect(self.questions.change)
+        window.close_requested.connect(self._consider_closing)
         window.closing.connect(self.shutdown)
         window.covariates.value_moved.connect(self.move)
         window.covariates.value_settled.connect(self.settle)
@@ -208,24 +240,27 @@ class Controller(QObject):
         window.covariates.reset_all_requested.connect(self.reset_all)
         window.covariates.follow_toggled.connect(self.set_follow)
 
-    def _commit(self, before: ExplorerState, after: ExplorerState) -> None:
-        self._history = record(self._history, before.values, after.values)
+    def _conclude(self, before: ExplorerState, after: ExplorerState) -> None:
+        self._timeline.record(before, after)
         self.go(after)
+        self._timeline.release(after)
 
-    def _travel(self, history: History, values: RealVector) -> None:
-        self._history = history
-        self.go(replace(self.state, values=values))
+    def _consider_closing(self, event: QCloseEvent) -> None:
+        """Keep the window open where what would be lost is dear to its user."""
+        if not self.questions.may_lose(CLOSE_WINDOW, self.state.patients):
+            event.ignore()
 
     def _moved(self, before: ExplorerState, name: str, value: float) -> ExplorerState:
         state = with_value(self.state, name, value)
         return followed(state, name, before.values) if state.follow else state
 
-    def _leave(self) -> None:
-        """Another patient or atlas comes; what was done to the covariates so far ends here."""
-        self._history = History()
-        self._before_move = None
+    def _finish_move(self) -> None:
+        """Something else comes; a movement that has not come to rest ends where it is."""
         self._window.shapes.set_moving(False)
         self._window.covariates.forget_moves()
+        if self._before_move is not None:
+            before, self._before_move = self._before_move, None
+            self._timeline.record(before, self.state)
 
 
 def _encoded(image: QImage, path: Path) -> bytes:

@@ -11,9 +11,10 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject
 
+from naisr_model.files import Stamp, stamp_of
 from naisr_viewer.control import jobs
 from naisr_viewer.control.controller import Controller
-from naisr_viewer.control.watch import FileWatch, Stamp, stamp_of
+from naisr_viewer.control.watch import FileWatch
 from naisr_viewer.engine.clinic import Clinic
 from naisr_viewer.state.explorer import showing, with_patient, without_patient
 from naisr_viewer.state.layouts import Layout
@@ -51,11 +52,11 @@ class PatientDesk(QObject):
         self._window, self._controller, self._clinic = window, controller, clinic
         self._keys = count(1)
         self._waiting: deque[Order] = deque()
-        self._stamps: dict[int, Stamp] = {}
         self._files = FileWatch(self)
         self._files.touched.connect(self._look_at_files)
         controller.refinement.settled.connect(self._read_next)
         controller.refinement.settled.connect(self._watch)
+        controller.travelled.connect(self._look_at_files)
         window.scan_requested.connect(self.open)
         window.reading_requested.connect(self.read)
         panel = window.patients
@@ -83,13 +84,12 @@ class PatientDesk(QObject):
         self._controller.go(showing(self._controller.state, key))
 
     def close(self, key: int) -> None:
-        """Forget a patient."""
+        """Take a patient from the list; undo brings it back, with its fit."""
         patient = self._controller.state.find(key)
         if patient is None:
             return
-        self._controller.go(without_patient(self._controller.state, key))
-        if patient.fit is not None:
-            self._clinic.forget(patient.fit)
+        self._controller.commit(without_patient(self._controller.state, key))
+        self._controller.refinement.tell(f"Closed {patient.name} · Ctrl+Z brings it back")
         self._watch()
 
     def read_differently(self, reading: Reading) -> None:
@@ -118,7 +118,7 @@ class PatientDesk(QObject):
 
     def compare(self, key: int | None) -> None:
         """Count changes from another patient; None for this patient as fitted."""
-        self._controller.go(replace(self._controller.state, compared=key))
+        self._controller.commit(replace(self._controller.state, compared=key))
 
     def set_ghost(self, has_ghost: bool) -> None:
         """Whether the scan is drawn over the full shape."""
@@ -141,7 +141,9 @@ class PatientDesk(QObject):
         return False
 
     def _read(self, order: Order) -> None:
-        """Read now, or when what is under way has ended."""
+        """Read now, or when what is under way has ended; of several files every error can be read."""
+        if not (self._waiting or self._controller.refinement.is_occupied):
+            self._controller.refinement.forget_errors()
         self._waiting.append(order)
         self._read_next()
 
@@ -152,7 +154,7 @@ class PatientDesk(QObject):
         order = self._waiting.popleft()
         path = order.reading.path
         job = jobs.reading(self._clinic, atlas.path, order.reading, order.known)
-        refinement.run(f"Reading {path.name} …", job, partial(self._has_read, order, stamp_of(path)))
+        refinement.go_on(f"Reading {path.name} …", job, partial(self._has_read, order, stamp_of(path)))
 
     def _has_read(self, order: Order, stamp: Stamp, found: Scan | Labels) -> None:
         if isinstance(found, Scan):
@@ -161,14 +163,11 @@ class PatientDesk(QObject):
             self._read(replace(order, reading=replace(order.reading, label=chosen)))
 
     def _show_read(self, order: Order, stamp: Stamp, scan: Scan) -> None:
-        """A scan that was read differently has to be fitted again."""
+        """A scan that was read differently has to be fitted again; undo brings back how it was."""
         old = self._controller.state.find(order.key)
         name = old.name if old is not None else self._name(order.reading)
-        patient = OpenScan(order.key, name, order.reading, scan, order.known)
-        self._stamps[order.key] = stamp
-        self._controller.go(with_patient(self._controller.state, patient))
-        if old is not None and old.fit is not None:
-            self._clinic.forget(old.fit)
+        patient = OpenScan(order.key, name, order.reading, scan, order.known, written=stamp)
+        self._controller.commit(with_patient(self._controller.state, patient))
         self._watch()
         self._look_at_files()
 
@@ -180,9 +179,7 @@ class PatientDesk(QObject):
             return
         state = with_patient(self._controller.state, replace(patient, known=known, fit=fit))
         layout = Layout.FIT if patient.fit is None else state.layout
-        self._controller.go(replace(state, layout=layout))
-        if patient.fit is not None:
-            self._clinic.forget(patient.fit)
+        self._controller.commit(replace(state, layout=layout))
 
     def _known_of(self, reading: Reading) -> Named:
         """What is known of an open patient with the same file."""
@@ -204,7 +201,7 @@ class PatientDesk(QObject):
     def _look_at_files(self) -> None:
         state = self._controller.state
         patients = tuple(
-            replace(each, is_changed=stamp_of(each.reading.path) not in (None, self._stamps[each.key]))
+            replace(each, is_changed=stamp_of(each.reading.path) not in (None, each.written))
             for each in state.patients
         )
         if [each.is_changed for each in patients] != [each.is_changed for each in state.patients]:

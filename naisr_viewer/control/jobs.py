@@ -11,7 +11,7 @@ from naisr_viewer.control.worker import Deliver, Job
 from naisr_viewer.engine.clinic import Clinic
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.files.exports import Planned
-from naisr_viewer.files.surfaces import write_surface
+from naisr_viewer.files.surfaces import require_writable, write_surface
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.patients import Fitted, Labels, Named, Reading, Scan
 from naisr_viewer.state.requests import ExportChoice, SurfaceRequest, SurfaceResult
@@ -58,11 +58,14 @@ def one_by_one(engine: Engine, requests: Sequence[SurfaceRequest]) -> Job[Surfac
 def exporting(
     engine: Engine, atlas: AtlasCard, plan: Sequence[Planned], choice: ExportChoice
 ) -> Job[ExportReport]:
-    """Writes the surfaces of a plan, computing what is missing; hands over a report on what was chosen."""
+    """Writes the surfaces of a plan, all or none; hands over a report on what was chosen."""
 
     def job(deliver: Deliver[ExportReport], progress: Progress) -> None:
-        for (request, path, owner), piece in progress.over(plan):
-            write_surface(path, engine.surface(request, piece), atlas, owner)
+        surfaces = [engine.surface(each.request, piece) for each, piece in progress.over(plan)]
+        for each, surface in zip(plan, surfaces, strict=True):
+            require_writable(each.path, surface)
+        for each, surface in zip(plan, surfaces, strict=True):
+            write_surface(each.path, surface, atlas, each.owner, each.reference)
         deliver(ExportReport(len(plan), choice))
 
     return job

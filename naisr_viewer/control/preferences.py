@@ -6,16 +6,17 @@ from pathlib import Path
 
 from PySide6.QtCore import QSettings
 
+from naisr_viewer.state.questions import Question
 from naisr_viewer.state.theme import ThemeChoice
 
 RECENT_FILES = 8
 
-THEME, RECENT = "theme", "recent"
+THEME, RECENT, ASKS = "theme", "recent", "asks"
 """Names in the user's settings."""
 
 
 class Preferences:
-    """Recent atlases and the theme.
+    """Recent atlases, the theme, and which questions are asked.
 
     Args:
         settings: where they are kept.
@@ -45,3 +46,11 @@ class Preferences:
         """Put a file in front of the recent ones."""
         recent = [path, *(other for other in self.recent if other != path)][:RECENT_FILES]
         self._settings.setValue(RECENT, [str(each) for each in recent])
+
+    def asks(self, question: Question) -> bool:
+        """Whether a question is asked; it is until the user wants it no more."""
+        return bool(self._settings.value(f"{ASKS}/{question.name}", True, type=bool))
+
+    def set_asks(self, question: Question, is_asked: bool) -> None:
+        """Ask it from now on, or no more."""
+        self._settings.setValue(f"{ASKS}/{question.name}", is_asked)

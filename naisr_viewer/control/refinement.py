@@ -54,6 +54,7 @@ class Refinement(QObject):
         self._state, self._is_moving = ExplorerState(), False
         self._task = Task.NOTHING
         self._halted = self._notice = ""
+        self._errors: list[str] = []
         self._patience = QTimer(self, singleShot=True, interval=PATIENCE_MS)
         self._patience.timeout.connect(lambda: window.show_progress(0.0))
         worker.progressed.connect(self._progressed)
@@ -82,11 +83,20 @@ class Refinement(QObject):
 
     def run(self, status: str, job: Job[Result], then: Deliver[Result]) -> None:
         """Give the worker something else than surfaces to do; the covariates rest meanwhile."""
-        self._window.show_error("")
+        self.forget_errors()
+        self.go_on(status, job, then)
+
+    def go_on(self, status: str, job: Job[Result], then: Deliver[Result]) -> None:
+        """The same for what belongs to an earlier act, whose errors stay to be read."""
         self._window.set_editable(False)
         self._window.show_status(status)
         self._worker.cancel()
         self._start(Task.UNDIVIDED, job, then)
+
+    def forget_errors(self) -> None:
+        """Something else is begun; what went wrong before it is history."""
+        self._errors = []
+        self._window.show_error("")
 
     def tell(self, notice: str) -> None:
         """Say something in the status line until the next change."""
@@ -172,9 +182,12 @@ class Refinement(QObject):
     def _failed(self, error: Exception) -> None:
         if isinstance(error, Cancelled):
             return
-        if not self.is_occupied:
+        if self.is_occupied:
+            self._errors.append(in_words(error))
+            self._window.show_error("\n".join(self._errors))
+        else:
             self._halted = "Stopped by an error"
-        self._window.show_error(in_words(error))
+            self._window.show_error(in_words(error))
 
     def _idle(self) -> None:
         was_occupied, self._task = self.is_occupied, Task.NOTHING

@@ -7,9 +7,6 @@ from pathlib import Path
 
 from PySide6.QtCore import QFileSystemWatcher, QObject, Signal
 
-Stamp = tuple[int, int] | None
-"""When a file was written (ns) and its size; None where there is none."""
-
 
 class FileWatch(QObject):
     """Watches files, and their folders: a new file is news of its folder."""
@@ -30,12 +27,3 @@ class FileWatch(QObject):
             self._files.removePaths(list(watched - wanted))
         if wanted - watched:
             self._files.addPaths(list(wanted - watched))
-
-
-def stamp_of(path: Path) -> Stamp:
-    """What changes when a file is written."""
-    try:
-        facts = path.stat()
-    except OSError:
-        return None
-    return facts.st_mtime_ns, facts.st_size

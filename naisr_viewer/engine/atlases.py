@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING
 
 from naisr_model.errors import Cancelled, InputError
-from naisr_model.files import require_file
+from naisr_model.files import require_file, stamp_of
 from naisr_viewer.engine.cache import Cache, fingerprint_of
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.requests import SurfaceResult
@@ -91,9 +91,10 @@ class Atlases:
             InputError: when there is no such file or it is not an atlas of surfaces.
         """
         require_file(path, "an atlas (.safetensors)")
+        written = stamp_of(path)
         fingerprint = fingerprint_of(path)
         if (kept := self._cache.opening(fingerprint, path)) is not None:
-            return Opened(kept.card, fingerprint, kept.picture), None
+            return Opened(replace(kept.card, written=written), fingerprint, kept.picture), None
         atlas = self._load(path)
         if atlas.frame.dim != 3:
             raise InputError(
@@ -101,7 +102,7 @@ class Atlases:
             )
         if fingerprint_of(path) != fingerprint:  # replaced meanwhile, as a training does now and then
             return self.read(path)
-        card = AtlasCard(path, atlas.name, atlas.covariates, atlas.population, atlas.capabilities)
+        card = AtlasCard(path, atlas.name, atlas.covariates, atlas.population, atlas.capabilities, written)
         return Opened(card, fingerprint, None), atlas
 
     def begin(self, opened: Opened, atlas: Atlas | None) -> list[Path]:

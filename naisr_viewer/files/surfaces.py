@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from naisr_model.covariates import Covariate
 from naisr_model.errors import InputError
 from naisr_model.exports import FORMATS, mesh_bytes
 from naisr_model.files import replacing
 from naisr_viewer import __version__
-from naisr_viewer.panels.kinds import title_of
+from naisr_viewer.panels.kinds import kind_of, title_of
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.patients import OpenScan
-from naisr_viewer.state.requests import SurfaceResult
+from naisr_viewer.state.requests import Origin, SurfaceRequest, SurfaceResult
 
 if TYPE_CHECKING:
     import trimesh
@@ -33,8 +34,16 @@ def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
         write(temporary)
 
 
+POINT_FORMATS = ("ply", "vtp")
+"""Formats that hold a cloud of points, and numbers at the points."""
+
+
 def write_surface(
-    path: Path, result: SurfaceResult, atlas: AtlasCard, patient: OpenScan | None = None
+    path: Path,
+    result: SurfaceResult,
+    atlas: AtlasCard,
+    patient: OpenScan | None = None,
+    reference: OpenScan | None = None,
 ) -> tuple[Path, Path]:
     """Write a surface and, beside it, a JSON record of what it shows.
 
@@ -43,6 +52,7 @@ def write_surface(
         result: the surface, in millimetres.
         atlas: where it came from.
         patient: whose it is; None for the population average.
+        reference: the patient that a change is counted from.
 
     Returns:
         The mesh file and the record.
@@ -50,17 +60,37 @@ def write_surface(
     Raises:
         InputError: when there is no surface to write, or the ending or folder will not do.
     """
-    if len(result.faces) == 0:
-        raise InputError(f"{title_of(result.request.panel)} has no surface at these values; nothing to write")
-    ending = next((each for each in FORMATS if path.suffix.lower() == f".{each}"), None)
-    if ending is None:
-        raise InputError(f"cannot write '{path.name}'; the ending must be one of {', '.join(FORMATS)}")
+    require_writable(path, result)
+    ending = next(each for each in FORMATS if each == ending_of(path))
     beside = record_of(path)
     content = mesh_bytes(_triangles(result), ending)
     write_atomically(path, lambda place: place.write_bytes(content))
-    text = json.dumps(description(result, atlas, path.name, patient), indent=2, ensure_ascii=False) + "\n"
+    record = description(result, atlas, path.name, patient, reference)
+    text = json.dumps(record, indent=2, ensure_ascii=False) + "\n"
     write_atomically(beside, lambda place: place.write_text(text, encoding="utf-8"))
     return path, beside
+
+
+def require_writable(path: Path, result: SurfaceResult) -> None:
+    """Make sure that a surface can be written to a file of this ending.
+
+    Raises:
+        InputError: when it cannot.
+    """
+    if len(result.points_mm) == 0:
+        raise InputError(f"{title_of(result.request.panel)} has no surface at these values; nothing to write")
+    ending = ending_of(path)
+    if ending not in FORMATS:
+        raise InputError(f"cannot write '{path.name}'; the ending must be one of {', '.join(FORMATS)}")
+    if len(result.faces) == 0 and ending not in POINT_FORMATS:
+        raise InputError(
+            f"{path.name} would hold a cloud of points; export it as {' or '.join(POINT_FORMATS)}"
+        )
+
+
+def ending_of(path: Path) -> str:
+    """``ply`` of ``a/shape.PLY``."""
+    return path.suffix.lower().removeprefix(".")
 
 
 def record_of(path: Path) -> Path:
@@ -69,25 +99,32 @@ def record_of(path: Path) -> Path:
 
 
 def description(
-    result: SurfaceResult, atlas: AtlasCard, file_name: str, patient: OpenScan | None = None
+    result: SurfaceResult,
+    atlas: AtlasCard,
+    file_name: str,
+    patient: OpenScan | None = None,
+    reference: OpenScan | None = None,
 ) -> dict[str, Any]:
     """What a mesh file shows, as plain JSON."""
     request, margin = result.request, result.volume_margin_cm3
     given = dict(request.values)
+    is_scan = result.origin is Origin.MEASURED
     return {
         "file": file_name,
         "atlas": atlas.name,
         "atlas_file": atlas.path.name,
         "view": title_of(request.panel),
-        "covariates": {c.name: _covariate_record(c, given.get(c.name, c.centre)) for c in atlas.covariates},
+        "covariates": _covariate_records(atlas, given),
         "depends_on": sorted(given),
-        "length_unit": "m" if file_name.lower().endswith(".glb") else "mm",
-        "up": "y" if file_name.lower().endswith(".glb") else "z",
-        "volume_cm3": round(result.volume_cm3, 4),
-        "volume_cm3_is": "of the smooth surface through the vertices, as in the window",
-        "volume_of_triangles_cm3": round(_triangles(result).volume / 1000, 4),
+        "length_unit": "m" if ending_of(Path(file_name)) == "glb" else "mm",
+        "up": "y" if ending_of(Path(file_name)) == "glb" else "z",
+        "volume_cm3": None if is_scan and not result.volume_cm3 else round(result.volume_cm3, 4),
+        "volume_cm3_is": OF_SCAN if is_scan else OF_SURFACE,
+        "volume_of_triangles_cm3": round(_triangles(result).volume / 1000, 4) if len(result.faces) else None,
         "volume_95_percent_margin_cm3": None if margin is None else round(margin, 4),
+        "numbers": _numbers_record(result, ending_of(Path(file_name))),
         "patient": None if patient is None else _patient_record(patient),
+        "before": _before_record(request, atlas, reference),
         "vertices": len(result.points_mm),
         "triangles": len(result.faces),
         "lattice_resolution": request.resolution,
@@ -95,11 +132,55 @@ def description(
     }
 
 
+OF_SURFACE = "of the smooth surface through the vertices, as in the window"
+OF_SCAN = "of the scan as it was read; the file holds it as it is shown, in the frame of the atlas"
+
+
+def _numbers(result: SurfaceResult) -> dict[str, NDArray[np.float32]]:
+    """What is known at the vertices, ``[n]``, by name with unit."""
+    coloured = result.colouring
+    return {} if coloured is None else {kind_of(result.request.panel).array: coloured.values}
+
+
+def _numbers_record(result: SurfaceResult, ending: str) -> dict[str, Any] | None:
+    """What the numbers at the vertices are, and whether the file holds them."""
+    if result.colouring is None:
+        return None
+    kind = kind_of(result.request.panel)
+    return {
+        "name": kind.array,
+        "unit": kind.unit,
+        "meaning": kind.hint.replace("\n", " "),
+        "colour_scale_ends_at": round(result.colouring.limit, 4),
+        "in_file": ending in POINT_FORMATS,
+    }
+
+
+def _before_record(
+    request: SurfaceRequest, atlas: AtlasCard, reference: OpenScan | None
+) -> dict[str, Any] | None:
+    """What a change is counted from."""
+    if request.before is None:
+        return None
+    record = {"covariates": _covariate_records(atlas, dict(request.before[1]))}
+    return record | {"patient": None if reference is None else _patient_record(reference)}
+
+
+def _covariate_records(atlas: AtlasCard, given: Mapping[str, float]) -> dict[str, Any]:
+    """Of all covariates; those that are not given are at the population mean."""
+    return {
+        each.name: _covariate_record(each, given.get(each.name, each.centre)) for each in atlas.covariates
+    }
+
+
 def _triangles(result: SurfaceResult) -> trimesh.Trimesh:
     import trimesh  # here, because it would slow down the start
 
     points = np.asarray(result.points_mm, dtype=np.float64)
-    return trimesh.Trimesh(points, result.faces, vertex_normals=result.normals, process=False)
+    numbers = cast("dict[str, ArrayLike]", _numbers(result))
+    return trimesh.Trimesh(
+        points, result.faces, vertex_normals=result.normals, vertex_attributes=numbers, process=False
+    )
 
 
 def _patient_record(patient: OpenScan) -> dict[str, Any]:

@@ -6,6 +6,7 @@ answered says the file of the same name under ``engine/answers``.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -38,6 +39,7 @@ class PanelKind:
             covariate when left out.
         scale: of the numbers on its surface; None where it has none.
         unit: of those numbers.
+        quantity: what they are, in a file; the name of the kind when left out.
         covariates: whose panels there are, one for each name; one of no covariate when left out.
         is_possible: whether an atlas can show it.
     """
@@ -51,8 +53,14 @@ class PanelKind:
     colour: str = ""
     scale: Scale | None = None
     unit: str = "mm"
+    quantity: str = ""
     covariates: Callable[[AtlasCard], tuple[str, ...]] = lambda _: ("",)
     is_possible: Callable[[AtlasCard], bool] = lambda _: True
+
+    @property
+    def array(self) -> str:
+        """What its numbers are called in a file, with their unit: ``change_mm``."""
+        return re.sub(r"\W+", "_", f"{self.quantity or self.name}_{self.unit}")
 
     def panels(self, atlas: AtlasCard) -> tuple[Panel, ...]:
         """All of this kind that an atlas can show."""

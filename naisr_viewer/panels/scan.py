@@ -40,4 +40,5 @@ KIND = PanelKind(
     caption=_caption,
     colour="#b9b2a6",
     scale="signed",
+    quantity="distance",
 )

@@ -101,7 +101,7 @@ def run_demo(window: MainWindow, controller: Controller, folder: Path) -> None:
 
 def _picture(window: MainWindow, controller: Controller, path: Path) -> None:
     finish(window, controller)
-    controller.save_screenshot(path)
+    controller.save_screenshot(path, replaces=True)
     _require_no_error(window)
 
 

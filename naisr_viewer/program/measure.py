@@ -37,7 +37,7 @@ from naisr_viewer.panels.kinds import request_for, visible_panels
 from naisr_viewer.state.layouts import FULL_SHAPE, Panel
 from naisr_viewer.state.requests import EXACT_RESOLUTION
 from naisr_viewer.views.covariates.row import CovariateRow
-from naisr_viewer.views.covariates.slider import slider_value
+from naisr_viewer.views.covariates.slider import chosen_value
 from naisr_viewer.views.main_window import MainWindow
 
 DRAG_S = 5.0
@@ -246,10 +246,10 @@ def _drag(row: CovariateRow) -> tuple[list[tuple[float, float]], float]:
         if now > DRAG_S:
             loop.quit()
             return
-        before = slider.sliderPosition()
+        before = chosen_value(row.covariate, slider.sliderPosition())
         QTest.mouseMove(slider, slider.place_of(swing(due)))
-        if slider.sliderPosition() != before:
-            changes.append((begin + due, slider_value(row.covariate, slider.sliderPosition())))
+        if (value := chosen_value(row.covariate, slider.sliderPosition())) != before:
+            changes.append((begin + due, value))
 
     QTest.mousePress(slider, left, pos=slider.place_of(swing(0.0)))
     timer.timeout.connect(move)

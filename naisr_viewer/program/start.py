@@ -83,15 +83,19 @@ def leave_a_core_to_the_window() -> None:
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 
-def make_window(engine: Engine, settings_file: Path | None = None) -> tuple[MainWindow, Controller]:
+def make_window(
+    engine: Engine, settings_file: Path | None = None, is_attended: bool = False
+) -> tuple[MainWindow, Controller]:
     """A window and what drives it; the application object exists already.
 
     Args:
         engine: computes the surfaces.
         settings_file: an INI file for recent files and theme instead of the user's own settings.
+        is_attended: whether somebody sits there who can be asked.
     """
     from PySide6.QtCore import QSettings
 
+    from naisr_viewer.control.atlas_watch import AtlasWatch
     from naisr_viewer.control.controller import Controller
     from naisr_viewer.control.desk import PatientDesk
     from naisr_viewer.control.preferences import Preferences
@@ -104,8 +108,9 @@ def make_window(engine: Engine, settings_file: Path | None = None) -> tuple[Main
     else:
         settings = QSettings(str(settings_file), QSettings.Format.IniFormat)
     window = MainWindow()
-    controller = Controller(window, engine, Worker(), Worker(), Preferences(settings))
+    controller = Controller(window, engine, Worker(), Worker(), Preferences(settings), is_attended)
     PatientDesk(window, controller, Clinic(engine))  # the controller owns it
+    AtlasWatch(controller)  # and this
     return window, controller
 
 
@@ -139,7 +144,7 @@ def attended(engine: Engine, first: First, pixels: tuple[int, int]) -> int:
 
     from naisr_viewer.program.interrupts import ending_at_once
 
-    window, controller = make_window(engine)
+    window, controller = make_window(engine, is_attended=True)
     if (reading := first.reading) is not None:
         once = Qt.ConnectionType.SingleShotConnection
         controller.refinement.settled.connect(lambda: window.reading_requested.emit(reading), once)

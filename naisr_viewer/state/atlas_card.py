@@ -8,6 +8,7 @@ from pathlib import Path
 
 from naisr_model.capabilities import Capabilities
 from naisr_model.covariates import Covariate, Population, complete, read_values
+from naisr_model.files import Stamp
 
 RealVector = tuple[float, ...]
 """Real covariate values in the atlas's covariate order."""
@@ -23,6 +24,7 @@ class AtlasCard:
         covariates: the sliders, in order; none where the shape model depends on none.
         population: real values of the subjects behind the atlas, for the histograms.
         capabilities: what its shape model can do; what it cannot do is absent from the window.
+        written: of the file, when it was read.
     """
 
     path: Path
@@ -30,6 +32,7 @@ class AtlasCard:
     covariates: tuple[Covariate, ...]
     population: Population
     capabilities: Capabilities
+    written: Stamp = None
 
     @property
     def centre(self) -> RealVector:

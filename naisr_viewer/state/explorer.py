@@ -25,6 +25,7 @@ class ExplorerState:
         patient: key of the one that is shown; None for the population average.
         compared: key of the one that is compared with; None for the patient as fitted.
         has_ghost: whether the scan is drawn over the full shape.
+        is_atlas_changed: whether the file of the atlas has changed on the disk since it was read.
     """
 
     atlas: AtlasCard | None = None
@@ -35,6 +36,7 @@ class ExplorerState:
     patient: int | None = None
     compared: int | None = None
     has_ghost: bool = True
+    is_atlas_changed: bool = False
 
     @property
     def named(self) -> Named:

@@ -9,6 +9,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from naisr_model.files import Stamp
+
 Named = tuple[tuple[str, float], ...]
 """Real covariate values by name, hashable."""
 
@@ -114,7 +116,8 @@ class OpenScan:
         scan: the measured shape.
         known: covariates that are given; the others are inferred.
         fit: None before the first fit.
-        is_changed: whether the file has changed on the disk since it was read.
+        written: of the file, when it was read.
+        is_changed: whether the file has changed on the disk since.
     """
 
     key: int
@@ -123,4 +126,5 @@ class OpenScan:
     scan: Scan
     known: Named = ()
     fit: Fitted | None = None
+    written: Stamp = None
     is_changed: bool = False

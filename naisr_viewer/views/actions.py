@@ -28,7 +28,7 @@ class Fact(Enum):
     ATLAS = auto()  # an atlas is open
     REST = auto()  # nothing is being opened, fitted or exported
     FIT = auto()  # the patient that is shown has been fitted
-    PAST = auto()  # a change of the covariates can be undone
+    PAST = auto()  # an act can be undone
     FUTURE = auto()  # one that was undone can be redone
 
 
@@ -42,6 +42,7 @@ class Window(Protocol):
     layout_requested: SignalInstance
     theme_requested: SignalInstance
     about_requested: SignalInstance
+    preferences_requested: SignalInstance
 
     def ask_atlas(self) -> None:
         """Let an atlas be chosen and opened."""
@@ -185,7 +186,7 @@ COMMANDS = (
         "Undo",
         lambda window: window.undo_requested.emit(),
         keys=("Ctrl+Z",),
-        tip="Undo the last change of a covariate",
+        tip="Undo the last act: a covariate moved, a scan opened, read, fitted, compared or closed",
         needs=frozenset({Fact.REST, Fact.PAST}),
     ),
     Command(
@@ -203,6 +204,13 @@ COMMANDS = (
         keys=("Ctrl+R",),
         needs=AT_REST,
         offered=lambda atlas: bool(atlas.covariates),
+    ),
+    Command(
+        "preferences",
+        "Preferences…",
+        lambda window: window.preferences_requested.emit(),
+        keys=("Ctrl+,",),
+        tip="Choose what is asked before it is done",
     ),
     *LAYOUTS,
     Command(
@@ -242,7 +250,7 @@ def _names(commands: Sequence[Command]) -> tuple[str, ...]:
 
 MENUS = {
     "&File": ("open atlas", "open scan", RECENT, SEPARATOR, "export", "screenshot", SEPARATOR, "quit"),
-    "&Edit": ("undo", "redo", "reset all"),
+    "&Edit": ("undo", "redo", "reset all", SEPARATOR, "preferences"),
     "&View": (
         *_names(LAYOUTS), "patients", SEPARATOR, "reset camera", *_names(LOOKS), SEPARATOR, *_names(THEMES),
     ),

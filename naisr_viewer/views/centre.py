@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtWidgets import QStackedWidget, QVBoxLayout, QWidget
 
+from naisr_viewer.views.changed_bar import ChangedBar
 from naisr_viewer.views.empty_page import EmptyPage
 from naisr_viewer.views.error_bar import ErrorBar
 
@@ -19,6 +20,7 @@ class Centre(QWidget):
     def __init__(self, shapes: QWidget, parent: QWidget) -> None:
         super().__init__(parent)
         self.errors = ErrorBar(self)
+        self.changed = ChangedBar(self)
         self.empty = EmptyPage(self)
         self._pages = QStackedWidget(self)
         self._pages.addWidget(self.empty)
@@ -27,6 +29,7 @@ class Centre(QWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
         column.addWidget(self.errors)
+        column.addWidget(self.changed)
         column.addWidget(self._pages, 1)
 
     def show_shapes(self, is_open: bool) -> None:

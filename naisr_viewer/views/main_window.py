@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from PySide6.QtCore import QSize, QTimer, Signal
+from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QGuiApplication, QImage, QPaintEvent
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QMainWindow, QWidget
 
@@ -13,6 +13,7 @@ from naisr_model.shipped import shipped
 from naisr_viewer.panels.kinds import visible_panels
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.patients import Labels
+from naisr_viewer.state.questions import Answer, Question
 from naisr_viewer.state.theme import ThemeChoice
 from naisr_viewer.views.actions import (
     COMMANDS,
@@ -32,7 +33,8 @@ from naisr_viewer.views.dialogs.documents import DocumentWindow
 from naisr_viewer.views.dialogs.export import ExportDialog
 from naisr_viewer.views.dialogs.files import ask_image_path, ask_open_path, ask_scan_path, dropped, is_atlas
 from naisr_viewer.views.dialogs.label import ask_label
-from naisr_viewer.views.dialogs.replace import ask_replace
+from naisr_viewer.views.dialogs.preferences import ask_preferences
+from naisr_viewer.views.dialogs.question import ask
 from naisr_viewer.views.patients.panel import PatientPanel
 from naisr_viewer.views.recent_menu import RecentMenu
 from naisr_viewer.views.shapes.shape_view import ShapeView
@@ -64,6 +66,8 @@ class MainWindow(QMainWindow):
     theme_requested = Signal(object)  # a ThemeChoice from the View menu
     cancel_requested = Signal()  # the cancel button beside the progress bar
     about_requested = Signal()  # Help > About
+    preferences_requested = Signal()  # Edit > Preferences…
+    close_requested = Signal(object)  # a QCloseEvent; who ignores it keeps the window open
     closing = Signal()  # the window is about to close
     appeared = Signal()  # the window has just been painted for the first time
 
@@ -102,6 +106,9 @@ class MainWindow(QMainWindow):
             self.setWindowTitle(f"{state.atlas.name} — {TITLE}")
             offer(COMMANDS, self._actions, state.atlas)
         self._centre.show_shapes(state.atlas is not None)
+        if state.is_atlas_changed != old.is_atlas_changed:  # what was put off stays so
+            name = state.atlas.path.name if state.atlas and state.is_atlas_changed else ""
+            self._centre.changed.show_changed(name)
         self.scale.setVisible(state.atlas is not None)
         self.covariates.show_values(state)
         self.patients.show_state(state)
@@ -189,6 +196,11 @@ class MainWindow(QMainWindow):
         if path is not None:
             self.open_requested.emit(path)
 
+    def _ask_again(self) -> None:
+        """Have the atlas opened that is open."""
+        if self._state.atlas is not None:
+            self.open_requested.emit(self._state.atlas.path)
+
     def ask_scan(self) -> None:
         """Let a patient's file be chosen and opened."""
         path = ask_scan_path(self)
@@ -198,7 +210,7 @@ class MainWindow(QMainWindow):
     def ask_export(self) -> None:
         """Let surfaces be chosen and written."""
         assert self._state.atlas is not None
-        choice = ExportDialog(self._state.atlas, self).ask()
+        choice = ExportDialog(self._state, self).ask()
         if choice is not None:
             self.export_requested.emit(choice)
 
@@ -208,9 +220,13 @@ class MainWindow(QMainWindow):
         if path is not None:
             self.screenshot_requested.emit(path)
 
-    def ask_replace(self, files: Sequence[Path]) -> bool:
-        """Whether files that are there already may be replaced."""
-        return ask_replace(self, files)
+    def ask(self, question: Question, text: str, detail: str) -> Answer:
+        """Whether something shall be done that cannot be undone."""
+        return ask(self, question, text, detail)
+
+    def ask_preferences(self, asked: Mapping[Question, bool]) -> dict[Question, bool] | None:
+        """Which questions shall be asked; None when nothing shall change."""
+        return ask_preferences(self, asked)
 
     def ask_label(self, labels: Labels) -> int | str | None:
         """Which label of a volume; None when nobody chose."""
@@ -221,7 +237,10 @@ class MainWindow(QMainWindow):
         return self.grab().toImage()
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Let the controller stop its work, then release what draws the shapes."""
+        """Unless it shall stay open, let the controller stop its work and release what draws the shapes."""
+        self.close_requested.emit(event)
+        if not event.isAccepted():
+            return
         self.closing.emit()
         self.shapes.clear()
         super().closeEvent(event)
@@ -247,6 +266,7 @@ class MainWindow(QMainWindow):
 
     def _compose(self) -> None:
         body = QWidget(self)
+        body.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # a click on the shapes ends what is typed elsewhere
         row = QHBoxLayout(body)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(0)
@@ -263,6 +283,7 @@ class MainWindow(QMainWindow):
     def _connect(self) -> None:
         self._recent.file_chosen.connect(self.open_requested)
         self._centre.empty.open_requested.connect(self.ask_atlas)
+        self._centre.changed.reopen_requested.connect(self._ask_again)
         self.patients.open_requested.connect(self.ask_scan)
         self.cancel.clicked.connect(self.cancel_requested)
         self.shapes.scale_changed.connect(self.scale.set_scale)

@@ -7,10 +7,10 @@ import re
 
 from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtGui import QFocusEvent, QKeyEvent, QWheelEvent
-from PySide6.QtWidgets import QLineEdit, QWidget
+from PySide6.QtWidgets import QLineEdit, QToolTip, QWidget
 
 from naisr_model.covariates import Covariate
-from naisr_viewer.words.numbers import decimals
+from naisr_viewer.words.numbers import decimals, written
 from naisr_viewer.words.titles import label
 
 WIDTH_PX = 76
@@ -19,7 +19,8 @@ NUMBER = re.compile(r"[-+−]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+−]?\d+)?")
 
 STEPS = {Qt.Key.Key_Up: 1, Qt.Key.Key_Down: -1, Qt.Key.Key_PageUp: 10, Qt.Key.Key_PageDown: -10}
 EDITING = (Qt.Key.Key_A, Qt.Key.Key_C, Qt.Key.Key_V, Qt.Key.Key_X)
-"""With Ctrl, what a box that holds no unfinished text keeps from the window's shortcuts."""
+UNDOING = (Qt.Key.Key_Z, Qt.Key.Key_Y)
+"""With Ctrl, what a box keeps from the window's shortcuts; the latter only while something is being typed."""
 
 
 def parsed(text: str) -> float | None:
@@ -54,7 +55,7 @@ class NumberBox(QLineEdit):
     @property
     def value(self) -> float | None:
         """What the text says, to the last digit of what was shown; None for nothing, NaN for no number."""
-        return self._taken if self.text() == self._written(self._taken) else parsed(self.text())
+        return parsed(self.text()) if self._is_unfinished else self._taken
 
     @property
     def complaint(self) -> str:
@@ -77,9 +78,12 @@ class NumberBox(QLineEdit):
             self.put(value)
 
     def put(self, value: float | None) -> None:
-        """Show a value, or nothing, in place of whatever was being typed; nobody is told."""
+        """Show a value, or nothing, in place of whatever was being typed; nobody is told.
+
+        The keystrokes that led there cannot be undone one by one any more: undo is the window's.
+        """
         self._taken = value
-        if self.text() != self._written(value):
+        if self.text() != self._written(value) or self.isModified() or self.isRedoAvailable():
             self.setText(self._written(value))
 
     def step_by(self, steps: int) -> None:
@@ -89,22 +93,26 @@ class NumberBox(QLineEdit):
         self._take(min(max(start + steps * self.step, low), high))
 
     def finish(self) -> None:
-        """Take what was typed, if it can be taken."""
+        """Take what was typed, if it can be taken; else say why not, beside the box."""
         value = self.value
         if value is None:
             self._emptied()
-        elif value != self._taken and not self.complaint:
+        elif value == self._taken:
+            self.put(value)
+        elif self.complaint:
+            QToolTip.showText(self.mapToGlobal(self.rect().bottomLeft()), self.toolTip(), self)
+        else:
             self._take(value)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Enter finishes, Esc takes back what was typed, arrows step."""
+        """Enter finishes, Esc restores what was there, arrows step."""
         key = event.key()
         if key in STEPS:
             self.step_by(STEPS[Qt.Key(key)])
         elif key in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             self.finish()
         elif key == Qt.Key.Key_Escape and self._is_unfinished:
-            self.put(self._taken)
+            self._restore()
         else:
             super().keyPressEvent(event)
 
@@ -128,26 +136,30 @@ class NumberBox(QLineEdit):
             if self._is_unfinished and event.key() == Qt.Key.Key_Escape:
                 event.accept()
                 return True
-            with_control = event.modifiers() & Qt.KeyboardModifier.ControlModifier
-            if with_control and not self._is_unfinished and event.key() not in EDITING:
+            kept = (*EDITING, *UNDOING) if self._is_unfinished else EDITING
+            if event.modifiers() & Qt.KeyboardModifier.ControlModifier and event.key() not in kept:
                 event.ignore()
                 return False
         return super().event(event)
 
     @property
     def _is_unfinished(self) -> bool:
-        return self.text() != self._written(self._taken)
+        return self.isModified()  # also by typing what was shown, which may have had more digits
 
     def _take(self, value: float) -> None:
         self.put(value)
         self.committed.emit(value)
+
+    def _restore(self) -> None:
+        """As if nothing had been typed."""
+        self.put(self._taken)
 
     def _emptied(self) -> None:
         """Nothing is no value here."""
         self.put(self._taken)
 
     def _written(self, value: float | None) -> str:
-        return "" if value is None else f"{value:.{decimals(self.covariate)}f}"
+        return "" if value is None else written(self.covariate, value)
 
     def _mark(self) -> None:
         low, high = self.covariate.range

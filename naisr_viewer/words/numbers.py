@@ -7,17 +7,37 @@ import math
 from naisr_model.covariates import Covariate
 from naisr_model.errors import InputError
 
+TYPED_DIGITS = 7
+"""Numbers that end within so many digits, counted from the last usual one, are shown as they are."""
+
 
 def decimals(covariate: Covariate) -> int:
     """Digits after the point that a number box has; the range counts as far as they tell it."""
     return covariate.decimals
 
 
+def written(covariate: Covariate, value: float) -> str:
+    """The value as its number box shows it: ``84``, and to the last digit what was typed: ``153.5``.
+
+    What has more digits than anybody types, such as an inferred value, is rounded.
+    """
+    usual = decimals(covariate)
+    exact = (digits for digits in range(usual, usual + TYPED_DIGITS) if round(value, digits) == value)
+    return f"{value:.{next(exact, usual)}f}"
+
+
 def reading(covariate: Covariate, value: float) -> str:
-    """The value with its unit and as many digits as its number box has: ``84 months``, ``M``."""
+    """The value with its unit and as many digits as its range asks for: ``84 months``, ``M``."""
     if covariate.kind == "binary":
         return covariate.format(round(value, 2))
     return f"{value:.{decimals(covariate)}f} {covariate.unit}".rstrip()
+
+
+def given(covariate: Covariate, value: float) -> str:
+    """A value that somebody gave, as it was given: ``153.5 months``, ``M``."""
+    if covariate.kind == "binary":
+        return covariate.format(value)
+    return f"{written(covariate, value)} {covariate.unit}".rstrip()
 
 
 def patient_reading(covariate: Covariate, value: float, interval: tuple[float, float] | None) -> str:

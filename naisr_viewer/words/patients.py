@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from naisr_model.covariates import Covariate
 from naisr_viewer.state.patients import Fitted, Method, Scan
-from naisr_viewer.words.numbers import capitalised, reading, volume
+from naisr_viewer.words.numbers import capitalised, given, reading, volume
 from naisr_viewer.words.titles import label
 
 LONGEST_WORD = 28
@@ -53,8 +53,12 @@ def findings(fit: Fitted, covariates: Sequence[Covariate]) -> list[tuple[str, st
     sure = {name: (low, high) for name, low, high in fit.intervals}
     rows = []
     for each in covariates:
-        how = interval(each, *sure[each.name]) if each.name in sure else "known"
-        rows.append((label(each.name), reading(each, values[each.name]), how))
+        value = values[each.name]
+        if each.name in sure:
+            told = reading(each, value), interval(each, *sure[each.name])
+        else:
+            told = given(each, value), "known"
+        rows.append((label(each.name), *told))
     lasting = []
     if fit.lasting is not None:
         lasting.append(("Lasting", f"{100 * fit.lasting:.0f} %", "of what sets the patient apart"))

@@ -52,6 +52,7 @@ class CovariatePanel(QFrame):
         """Make the rows of ``atlas``."""
         for row in self.rows.values():
             self._rows_area.removeWidget(row)
+            row.hide()  # it is there until the next event, under the title of the new atlas
             row.deleteLater()
         self.rows = {}
         for covariate in atlas.covariates:

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QLabel, QToolBut
 
 from naisr_model.covariates import Covariate
 from naisr_viewer.views.covariates.histogram import Histogram
-from naisr_viewer.views.covariates.slider import JumpSlider, slider_position, slider_value
+from naisr_viewer.views.covariates.slider import JumpSlider, chosen_value, slider_position
 from naisr_viewer.views.level_buttons import LevelButton, level_buttons
 from naisr_viewer.views.number_box import NumberBox
 from naisr_viewer.views.theme import Theme
@@ -135,7 +135,7 @@ class CovariateRow(QWidget):
             button.clicked.connect(self._level_chosen)
 
     def _slider_changed(self, position: int) -> None:
-        self._moved(slider_value(self.covariate, position))
+        self._moved(chosen_value(self.covariate, position))
         if self.slider.isSliderDown():
             self._settle.stop()
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QPoint, Qt
-from PySide6.QtGui import QMouseEvent
+from PySide6.QtGui import QMouseEvent, QWheelEvent
 from PySide6.QtWidgets import QSlider, QWidget
 
 from naisr_model.covariates import Covariate
 from naisr_viewer.views.theme import Theme
+from naisr_viewer.words.numbers import decimals
 
 SLIDER_STEPS = 1000
 """Positions of a slider; a key press moves ten of them."""
@@ -27,6 +28,12 @@ def slider_value(covariate: Covariate, position: int) -> float:
     """The real value at a slider position."""
     low, high = covariate.range
     return low + (high - low) * position / SLIDER_STEPS
+
+
+def chosen_value(covariate: Covariate, position: int) -> float:
+    """The real value that is taken at a slider position: as round as it is shown, and the ends exactly."""
+    value = slider_value(covariate, position)
+    return value if position in (0, SLIDER_STEPS) else round(value, decimals(covariate))
 
 
 def track_x(share: float, width: int) -> float:
@@ -51,6 +58,10 @@ class JumpSlider(QSlider):
     def place_of(self, share: float) -> QPoint:
         """The middle of the handle, in pixels, where it stands at a share of the range."""
         return QPoint(round(track_x(share, self.width())), self.height() // 2)
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """The wheel belongs to what scrolls."""
+        event.ignore()
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Start dragging from the pressed place."""

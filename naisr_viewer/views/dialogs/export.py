@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from PySide6.QtWidgets import (
@@ -17,26 +18,39 @@ from PySide6.QtWidgets import (
 )
 
 from naisr_model.exports import FORMATS
-from naisr_viewer.panels.kinds import panels_in, title_of
-from naisr_viewer.state.atlas_card import AtlasCard
+from naisr_viewer.panels.kinds import panels_in, title_of, visible_panels
+from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Layout, Panel
 from naisr_viewer.state.requests import EXACT_RESOLUTION, ExportChoice
-from naisr_viewer.views.dialogs.pieces import buttons_of, column_in
+from naisr_viewer.views.dialogs.pieces import buttons_of, column_in, enable_accept
 
 RESOLUTIONS = (64, EXACT_RESOLUTION, 192, 256)
 
 
-class ExportDialog(QDialog):
-    """Which surfaces, in which format, how fine and where to."""
+NOTE = (
+    "Millimetres, z up; GLB: metres, y up, as the format says. A record beside each file (.json) tells the "
+    "covariates and the atlas. PLY and VTP also hold the numbers that are shown as colours."
+)
 
-    def __init__(self, atlas: AtlasCard, parent: QWidget | None = None) -> None:
+
+class ExportDialog(QDialog):
+    """Which surfaces, in which format, how fine and where to.
+
+    Args:
+        state: what is on screen; there is an atlas.
+        parent: the window that waits.
+    """
+
+    def __init__(self, state: ExplorerState, parent: QWidget | None = None) -> None:
         super().__init__(parent)
+        assert state.atlas is not None
         self.setWindowTitle("Export surfaces")
         self.setMinimumWidth(460)
-        panels = panels_in(Layout.SIDE_BY_SIDE, atlas)
+        on_screen = visible_panels(state)
+        others = [each for each in panels_in(Layout.SIDE_BY_SIDE, state.atlas) if each not in on_screen]
         self.what = QComboBox(self)
-        self.what.addItem("All views", panels)
-        for panel in reversed(panels):
+        self.what.addItem("All views on screen", on_screen)
+        for panel in (*reversed(on_screen), *reversed(others)):
             self.what.addItem(title_of(panel), (panel,))
         self.format = QComboBox(self)
         self.format.addItems([name.upper() for name in FORMATS])
@@ -51,7 +65,7 @@ class ExportDialog(QDialog):
     def choice(self) -> ExportChoice:
         """What the dialog says now."""
         panels: tuple[Panel, ...] = tuple(self.what.currentData())
-        folder = Path(self.folder.text()).expanduser()
+        folder = Path(os.path.expanduser(self.folder.text().strip())).absolute()
         return ExportChoice(panels, self.format.currentText().lower(), self.detail.currentData(), folder)
 
     def ask(self) -> ExportChoice | None:
@@ -65,21 +79,21 @@ class ExportDialog(QDialog):
         where.addWidget(self.folder, 1)
         where.addWidget(browse)
         form = QFormLayout()
-        form.addRow("Surfaces", self.what)
-        form.addRow("Format", self.format)
-        form.addRow("Detail", self.detail)
-        form.addRow("Folder", where)
-        note = QLabel(
-            "Millimetres, z up; GLB: metres, y up, as the format says. A record beside each file (.json) "
-            "tells the covariates and the atlas.",
-            self,
-        )
+        form.addRow("&Surfaces", self.what)
+        form.addRow("&Format", self.format)
+        form.addRow("&Detail", self.detail)
+        label = QLabel("F&older", self)
+        label.setBuddy(self.folder)
+        form.addRow(label, where)
+        note = QLabel(NOTE, self)
         note.setObjectName("muted")
         note.setWordWrap(True)
         column = column_in(self)
         column.addLayout(form)
         column.addWidget(note)
-        column.addWidget(buttons_of(self, "Export"))
+        buttons = buttons_of(self, "Export")
+        column.addWidget(buttons)
+        self.folder.textChanged.connect(lambda text: enable_accept(buttons, bool(text.strip())))
 
     def _browse(self) -> None:
         name = QFileDialog.getExistingDirectory(self, "Export into", self.folder.text())

@@ -11,20 +11,11 @@ from naisr_viewer.state.explorer import ExplorerState
 
 ATLAS_ENDING = ".safetensors"
 ATLAS_FILTER = f"Atlas (*{ATLAS_ENDING});;All files (*)"
+PICTURE_ENDING = ".png"
 SCAN_ENDINGS = (
-    "stl",
-    "ply",
-    "obj",
-    "vtk",
-    "vtp",
-    "glb",
-    "nii",
-    "nii.gz",
-    "nrrd",
-    "nhdr",
-    "csv",
-    "txt",
-    "xyz",
+    *("stl", "ply", "obj", "vtk", "vtp", "glb"),
+    *("nii", "nii.gz", "nrrd", "nhdr"),
+    *("csv", "txt", "xyz"),
 )
 """Meshes, label volumes and text files of points that can be opened as a scan."""
 
@@ -51,10 +42,16 @@ def ask_landmarks_path(parent: QWidget) -> Path | None:
 
 
 def ask_image_path(parent: QWidget, state: ExplorerState) -> Path | None:
-    """Where a picture goes, or None."""
-    proposal = f"{state.atlas.name if state.atlas else 'atlas'}.png"
-    name, _ = QFileDialog.getSaveFileName(parent, "Save a picture", proposal, "PNG (*.png)")
-    return Path(name).with_suffix(".png") if name else None
+    """Where a picture goes, or None; whether a file may be replaced is asked of the whole name."""
+    proposal = f"{state.atlas.name if state.atlas else 'atlas'}{PICTURE_ENDING}"
+    unasked = QFileDialog.Option.DontConfirmOverwrite
+    name, _ = QFileDialog.getSaveFileName(parent, "Save a picture", proposal, "PNG (*.png)", "", unasked)
+    return as_picture(Path(name)) if name else None
+
+
+def as_picture(path: Path) -> Path:
+    """``path`` with the ending of a picture added where it lacks: ``fig.age150`` is ``fig.age150.png``."""
+    return path if path.suffix.lower() == PICTURE_ENDING else path.with_name(f"{path.name}{PICTURE_ENDING}")
 
 
 def dropped(data: QMimeData) -> list[Path]:

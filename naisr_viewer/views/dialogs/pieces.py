@@ -21,3 +21,10 @@ def buttons_of(dialog: QDialog, accept: str) -> QDialogButtonBox:
     buttons.accepted.connect(dialog.accept)
     buttons.rejected.connect(dialog.reject)
     return buttons
+
+
+def enable_accept(buttons: QDialogButtonBox, is_enabled: bool) -> None:
+    """Whether what the Enter key does can be done."""
+    for button in buttons.buttons():
+        if buttons.buttonRole(button) is QDialogButtonBox.ButtonRole.AcceptRole:
+            button.setEnabled(is_enabled)

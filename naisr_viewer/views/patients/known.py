@@ -51,6 +51,11 @@ class NumberField(NumberBox):
         self.setFocus()
         self.selectAll()
 
+    def _restore(self) -> None:
+        """As if nothing had been typed; whoever was told of the typing is told of that."""
+        super()._restore()
+        self.edited.emit()
+
     def _emptied(self) -> None:
         """Nothing means: to be inferred."""
         self.put(None)

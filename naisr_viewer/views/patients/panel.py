@@ -90,8 +90,6 @@ class PatientPanel(QFrame):
         """What was typed belongs to its patient and is found again when that is shown again."""
         if old is not None and (new is None or new.key != old.key):
             self._drafts[old.key] = self.known.given()
-        open_keys = {patient.key for patient in self._state.patients}
-        self._drafts = {key: draft for key, draft in self._drafts.items() if key in open_keys}
         if new is None:
             return
         if old is None or old.key != new.key:

@@ -18,6 +18,7 @@ from naisr_viewer.control.preferences import Preferences
 from naisr_viewer.control.worker import Worker
 from naisr_viewer.panels.kinds import panels_in, request_for
 from naisr_viewer.state.layouts import FULL_SHAPE, TEMPLATE, Layout, Panel
+from naisr_viewer.state.questions import CLOSE_WINDOW, OPEN_ATLAS, REPLACE_FILES, Answer
 from naisr_viewer.state.requests import (
     EXACT_RESOLUTION,
     PREVIEW_RESOLUTION,
@@ -44,6 +45,8 @@ class WindowSignals(QObject):
     theme_requested = Signal(object)
     cancel_requested = Signal()
     about_requested = Signal()
+    preferences_requested = Signal()
+    close_requested = Signal(object)
     closing = Signal()
 
 
@@ -186,6 +189,19 @@ def test_one_drag_is_one_step_to_undo(ready, window):
     assert dict(ready.state.named)["age"] == 130.0
 
 
+def test_undo_comes_before_a_movement_counts_as_at_rest(ready, window):
+    window.covariates.value_settled.emit("age", 150.0)
+    window.covariates.value_moved.emit("weight", 50.0)
+    window.show_history.assert_called_with(True, False)
+    window.undo_requested.emit()
+    assert ready.state.values == (150.0, 35.0, 0.0) and not ready.is_moving
+    window.redo_requested.emit()
+    assert ready.state.values == (150.0, 50.0, 0.0)
+    window.undo_requested.emit()
+    window.undo_requested.emit()
+    assert ready.state.values == (100.0, 35.0, 0.0)
+
+
 def test_the_others_follow_while_one_is_dragged_and_come_back_with_it(ready, window):
     """The children of the stand-in gain 0.31 kg a month."""
     window.covariates.signals.follow_toggled.emit(True)
@@ -268,16 +284,58 @@ def test_export_writes_what_is_asked_for_even_out_of_view(ready, window, tmp_pat
 def test_an_export_replaces_nothing_unasked(ready, window, tmp_path):
     choice = ExportChoice((FULL_SHAPE,), "stl", 64, tmp_path / "out")
     window.export_requested.emit(choice)
-    window.ask_replace.assert_not_called()
+    window.ask.assert_not_called()
     (mesh,) = choice.folder.glob("*.stl")
     mesh.write_text("mine")
-    window.ask_replace.return_value = False
+    window.ask.return_value = Answer(goes_on=False, is_last=True)
     window.export_requested.emit(choice)
-    assert window.ask_replace.call_args.args[0] == [mesh, mesh.with_name(f"{mesh.name}.json")]
+    question, text, detail = window.ask.call_args.args
+    assert question is REPLACE_FILES and "These 2 files are there already" in text
+    assert detail == f"{mesh.name}\n{mesh.name}.json"
     assert mesh.read_text() == "mine"
-    window.ask_replace.return_value = True
+    window.ask.return_value = Answer(goes_on=True)
     window.export_requested.emit(choice)
+    assert mesh.stat().st_size > 1000 and window.ask.call_count == 2
+
+
+def test_a_question_is_asked_until_it_is_answered_for_good(ready, window, tmp_path, settings):
+    choice = ExportChoice((FULL_SHAPE,), "stl", 64, tmp_path / "out")
+    window.export_requested.emit(choice)
+    window.ask.return_value = Answer(goes_on=True, is_last=True)
+    window.export_requested.emit(choice)
+    window.export_requested.emit(choice)
+    assert window.ask.call_count == 1
+    again = Preferences(QSettings(settings.fileName(), QSettings.Format.IniFormat))
+    settings.sync()
+    assert not again.asks(REPLACE_FILES) and again.asks(CLOSE_WINDOW)
+    window.ask_preferences.return_value = None
+    window.preferences_requested.emit()
+    assert not again.asks(REPLACE_FILES)
+    window.ask_preferences.return_value = {REPLACE_FILES: True}
+    window.preferences_requested.emit()
+    assert window.ask_preferences.call_args.args[0] == {
+        OPEN_ATLAS: True, CLOSE_WINDOW: True, REPLACE_FILES: False,
+    }  # fmt: skip
+    window.export_requested.emit(choice)
+    assert window.ask.call_count == 2
+
+
+def test_where_nobody_sits_nothing_is_asked_and_nothing_replaced(
+    window, engine, settings, atlas_file, tmp_path
+):
+    preferences = Preferences(settings)
+    workers = Worker(synchronous=True), Worker(synchronous=True)
+    controller = Controller(window, engine, *workers, preferences, is_attended=False)
+    controller.open(atlas_file)
+    choice = ExportChoice((FULL_SHAPE,), "stl", 64, tmp_path / "out")
+    controller.export(choice)
+    (mesh,) = choice.folder.glob("*.stl")
+    mesh.write_text("mine")
+    controller.export(choice)
+    assert mesh.read_text() == "mine" and "there already" in window.show_error.call_args.args[0]
+    controller.export(choice, replaces=True)
     assert mesh.stat().st_size > 1000
+    window.ask.assert_not_called()
 
 
 def test_export_into_an_impossible_folder_is_explained(ready, window, tmp_path):
@@ -294,6 +352,11 @@ def test_a_screenshot_is_written_whole(ready, window, tmp_path):
     window.screenshot_requested.emit(tmp_path / "picture.png")
     assert QImage(str(tmp_path / "picture.png")).size() == image.size()
     assert [path.name for path in tmp_path.glob(".picture*")] == []
+    window.ask.return_value = Answer(goes_on=False)
+    (tmp_path / "picture.png").write_text("mine")
+    window.screenshot_requested.emit(tmp_path / "picture.png")
+    assert "there already" in window.ask.call_args.args[1]
+    assert (tmp_path / "picture.png").read_text() == "mine"
     window.screenshot_requested.emit(tmp_path / "picture.nonsense")
     assert "end its name with .png" in window.show_error.call_args.args[0]
 

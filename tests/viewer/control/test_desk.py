@@ -9,15 +9,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import pyvista as pv
 import trimesh
 from eggs import egg
-from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
+from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QTimer, QUrl
 from PySide6.QtGui import QAction, QDropEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QFileDialog, QWidget
+from PySide6.QtWidgets import QApplication, QFileDialog, QMessageBox, QWidget
 
 from naisr_viewer.engine.engine import Engine
+from naisr_viewer.panels.kinds import visible_panels
 from naisr_viewer.program.start import make_window
+from naisr_viewer.state.history import UNDO_DEPTH
 from naisr_viewer.state.layouts import FULL_SHAPE, TEMPLATE, Layout, Panel
 from naisr_viewer.state.patients import Reading
 from naisr_viewer.state.requests import ExportChoice
@@ -303,13 +306,136 @@ def test_a_label_is_chosen(ready, qtbot, tmp_path, monkeypatch):
     assert controller.state.shown.scan.volume_cm3 == pytest.approx(truth, rel=0.05)
 
 
-def test_closing_a_patient_forgets_the_code(fitted, qtbot, engine):
+def undo(window, qtbot, controller) -> None:
+    """Ctrl+Z, heard by the window whatever has the focus."""
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow)
+    QTest.keyClick(window.focusWidget() or window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    settle(qtbot, controller)
+
+
+def test_a_closed_patient_comes_back_with_its_fit_at_once(fitted, qtbot, engine):
+    window, controller = fitted
+    before, mine = controller.state, controller.shown[FULL_SHAPE].points_mm
+    window.patients.list.setFocus()
+    QTest.keyClick(window.patients.list, Qt.Key.Key_Delete)
+    settle(qtbot, controller)
+    assert controller.state.patients == () and controller.state.person == 0
+    assert "Ctrl+Z" in window.status.text() and before.person in engine.persons
+    undo(window, qtbot, controller)
+    assert controller.state == before
+    assert controller.shown[FULL_SHAPE].points_mm is mine  # remembered, not computed
+    assert dict(window.patients.known.given()) == {"age": 6.0, "sex": 1.0}
+
+
+def test_what_only_the_history_held_is_freed_when_that_forgets_it(fitted, qtbot, engine):
     window, controller = fitted
     person = controller.state.person
     window.patients.close_requested.emit(controller.state.patients[0].key)
+    for step in range(UNDO_DEPTH):
+        assert person in engine.persons
+        controller.settle("age", 3.0 + step / 100)
     settle(qtbot, controller)
-    assert controller.state.patients == () and controller.state.person == 0
-    assert person not in engine.persons
+    assert engine.persons == frozenset()
+
+
+def test_a_scan_read_differently_keeps_the_fit_within_reach(fitted, qtbot):
+    window, controller = fitted
+    before = controller.state
+    box = window.patients.alignment.method
+    box.setFocus()
+    QTest.keyClick(box, Qt.Key.Key_Down)  # rigid
+    settle(qtbot, controller)
+    assert controller.state.shown.reading.align == "icp" and controller.state.fit is None
+    undo(window, qtbot, controller)
+    assert controller.state == before and window.patients.alignment.method.currentData() == "none"
+
+
+def test_fits_readings_and_comparisons_are_undone_one_by_one(fitted, qtbot, engine):
+    window, controller = fitted
+    once = controller.state
+    click(window.patients.known.fit)
+    settle(qtbot, controller)
+    twice = controller.state
+    window.patients.reread_requested.emit()
+    settle(qtbot, controller)
+    window.patients.patient_chosen.emit(twice.patient)
+    window.patients.compared_chosen.emit(controller.state.patients[1].key)
+    settle(qtbot, controller)
+    assert engine.persons == {once.person, twice.person}
+    undo(window, qtbot, controller)
+    assert controller.state.compared is None and len(controller.state.patients) == 2
+    undo(window, qtbot, controller)
+    assert controller.state == twice
+    undo(window, qtbot, controller)
+    assert controller.state == once
+    undo(window, qtbot, controller)
+    assert controller.state.fit is None and controller.state.shown.scan is once.shown.scan
+    undo(window, qtbot, controller)
+    assert controller.state.patients == () and not action(window, "Undo").isEnabled()
+    for _ in range(3):
+        action(window, "Redo").trigger()
+    settle(qtbot, controller)
+    assert controller.state == twice
+
+
+def test_a_file_that_changed_meanwhile_is_told_of_after_an_undo(fitted, qtbot, scan_file):
+    window, controller = fitted
+    window.patients.close_requested.emit(controller.state.patients[0].key)
+    settle(qtbot, controller)
+    egg(7.0, 1.0).export(scan_file)
+    undo(window, qtbot, controller)
+    assert controller.state.shown.is_changed
+
+
+@pytest.fixture
+def attended(fitted):
+    """The same with somebody who is asked."""
+    window, controller = fitted
+    controller.questions.is_attended = True
+    yield window, controller
+    controller.questions.is_attended = False
+
+
+def answer(button: str, seen: list[str], *, is_last: bool = False) -> None:
+    """Press a button of the question that comes next."""
+
+    def press() -> None:
+        dialog = QApplication.activeModalWidget()
+        assert isinstance(dialog, QMessageBox)
+        seen.append(dialog.text())
+        dialog.checkBox().setChecked(is_last)
+        (wanted,) = [each for each in dialog.buttons() if each.text().replace("&", "") == button]
+        click(wanted)
+
+    QTimer.singleShot(0, press)
+
+
+def test_another_atlas_takes_no_fits_with_it_unasked(attended, qtbot, egg_atlas, engine):
+    window, controller = attended
+    before, seen = controller.state, list[str]()
+    answer("Cancel", seen)
+    window.open_requested.emit(egg_atlas)
+    assert controller.state is before and not controller.is_busy
+    assert "1 patient, 1 fit." in seen[0] and "p01.stl" in seen[0]
+    answer("Open", seen)
+    window.open_requested.emit(egg_atlas)
+    settle(qtbot, controller)
+    assert controller.state.patients == () and engine.persons == frozenset()
+    window.open_requested.emit(egg_atlas)  # nothing to lose, nothing asked
+    settle(qtbot, controller)
+    assert len(seen) == 2
+
+
+def test_the_window_closes_with_patients_only_when_it_may(attended):
+    window, _ = attended
+    seen: list[str] = []
+    answer("Cancel", seen)
+    action(window, "Quit").trigger()
+    assert window.isVisible() and window.shapes.is_ready and len(seen) == 1
+    answer("Close", seen, is_last=True)
+    window.close()
+    assert not window.isVisible() and len(seen) == 2
 
 
 def test_an_export_says_whose_shape_it_is(fitted, qtbot, tmp_path):
@@ -320,6 +446,47 @@ def test_an_export_says_whose_shape_it_is(fitted, qtbot, tmp_path):
     assert record["patient"]["known"] == {"age": 6.0, "sex": 1.0}
     mesh = trimesh.load_mesh(tmp_path / "out" / "eggs-p01-full-shape_age6_sexM.stl")
     assert mesh.volume / 1000 == pytest.approx(CUBIC_CM, rel=0.05)
+
+
+@pytest.mark.parametrize("layout", [Layout.FIT, Layout.CHANGE])
+def test_all_views_on_screen_are_exported_with_their_numbers(fitted, qtbot, tmp_path, layout):
+    _, controller = fitted
+    controller.set_layout(layout)
+    controller.settle("age", 8.5)
+    settle(qtbot, controller)
+    shown = dict(controller.shown)
+    panels = visible_panels(controller.state)
+    controller.export(ExportChoice(panels, "vtp", 64, tmp_path / "out"))
+    settle(qtbot, controller)
+    files = {path.name: path for path in (tmp_path / "out").glob("*.vtp")}
+    stems = {
+        Layout.FIT: ["full-shape_age8.5", "scan_age8.5", "uncertainty_age8.5", "deviation_age8.5"],
+        Layout.CHANGE: ["before_age6", "full-shape_age8.5", "change_age8.5_sexM_since_age6"],
+    }
+    assert set(files) == {f"eggs-p01-{stem}_sexM.vtp" for stem in stems[layout]}
+    for panel in panels:
+        (path,) = [
+            path for name, path in files.items() if f"-p01-{panel.kind.replace('shape', 'full')}" in name
+        ]
+        arrays, colouring = pv.read(path).point_data, shown[panel].colouring
+        record = json.loads(path.with_name(f"{path.name}.json").read_text())
+        assert record["patient"]["known"] == {"age": 6.0, "sex": 1.0}
+        if colouring is not None:
+            np.testing.assert_allclose(arrays[record["numbers"]["name"]], colouring.values)
+            assert record["numbers"]["in_file"]
+
+
+def test_an_export_that_cannot_hold_one_view_writes_none(ready, qtbot, tmp_path):
+    window, controller = ready
+    cloud = tmp_path / "p02.xyz"
+    np.savetxt(cloud, egg(6.0, 1.0).sample(4000, seed=0))
+    drop(window, cloud)
+    settle(qtbot, controller)
+    click(window.patients.known.fit)
+    settle(qtbot, controller)
+    controller.export(ExportChoice(visible_panels(controller.state), "stl", 64, tmp_path / "out"))
+    settle(qtbot, controller)
+    assert "cloud of points" in window.error_text.text() and not (tmp_path / "out").exists()
 
 
 def test_a_value_the_atlas_never_saw_is_not_turned_into_another(ready, qtbot, scan_file):
@@ -348,7 +515,11 @@ def test_a_movement_ends_with_its_patient(fitted, qtbot):
     qtbot.wait(600)
     settle(qtbot, controller)
     assert controller.state.values == controller.state.home and not controller.is_moving
-    assert not action(window, "Undo").isEnabled()
+    undo(window, qtbot, controller)
+    assert controller.state.person > 0 and dict(controller.state.named)["age"] == 6.0
+    action(window, "Redo").trigger()
+    settle(qtbot, controller)
+    assert controller.state.person > 0 and dict(controller.state.named)["age"] == 8.0
 
 
 def test_nothing_of_one_patient_stands_under_another(fitted, qtbot):
@@ -369,6 +540,20 @@ def test_several_scans_that_are_dropped_are_all_read(ready, qtbot, tmp_path):
     qtbot.waitUntil(lambda: len(controller.state.patients) == 3, timeout=60_000)
     settle(qtbot, controller)
     assert [each.name for each in controller.state.patients] == ["v0.ply", "v1.ply", "v2.ply"]
+
+
+def test_of_several_files_every_one_that_cannot_be_read_is_told_of(ready, qtbot, tmp_path):
+    window, controller = ready
+    for name in ("first.docx", "good.ply", "last.docx"):
+        egg(5.0, 1.0).export(tmp_path / name, file_type="ply")
+        drop(window, tmp_path / name)
+    qtbot.waitUntil(lambda: len(controller.state.patients) == 1, timeout=60_000)
+    settle(qtbot, controller)
+    told = window.error_text.text().replace("\u200b", "")
+    assert "first.docx" in told and "last.docx" in told
+    drop(window, tmp_path / "good.ply")  # another act
+    settle(qtbot, controller)
+    assert not window.error_text.text()
 
 
 def test_what_would_end_a_fit_rests_meanwhile(ready, qtbot, scan_file):

@@ -42,6 +42,23 @@ def test_no_two_views_of_one_export_meet(state, card, tmp_path):
     assert len({each.path for each in plan}) == len(plan) == 5
 
 
+def test_views_whose_names_would_be_the_same_are_numbered(card, tmp_path):
+    twins = tuple(replace(card.covariates[0], name=name) for name in ("age", "Age", "a/b", "a:b"))
+    strange = opened(ExplorerState(), replace(card, covariates=twins))
+    panels = tuple(Panel("effect", each.name) for each in twins)
+    plan = planned(strange, ExportChoice(panels, "ply", 64, tmp_path))
+    assert len({each.path.name.lower() for each in plan}) == len(plan) == 4
+
+
+def test_a_long_name_is_shortened_and_stays_its_own(card):
+    def stem(age: float) -> str:
+        covariate = replace(card.covariates[0], name="ä" * 200)
+        request = SurfaceRequest(card.path, FULL_SHAPE, ((covariate.name, age),), 64)
+        return file_stem(replace(card, covariates=(covariate,)), request)
+
+    assert len(stem(10.0).encode()) < 200 and stem(10.0) != stem(20.0)
+
+
 @pytest.mark.parametrize("name", ["../../etc", "a/b", "Wirbel säule", 'x"y', "a:b*c?", "{x} <b>"])
 def test_no_name_leaves_the_folder(state, card, tmp_path, name):
     strange = replace(card, name=name)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from naisr_model.errors import InputError
 from naisr_model.exports import FORMATS
 from naisr_viewer.files import surfaces as export
 from naisr_viewer.state.layouts import FULL_SHAPE, Panel
-from naisr_viewer.state.requests import SurfaceRequest, SurfaceResult
+from naisr_viewer.state.requests import Colouring, Origin, SurfaceRequest, SurfaceResult
 
 VALUES = {"age": 150.0, "weight": 50.0, "sex": 1.0}
 
@@ -64,6 +65,61 @@ def test_the_record_says_what_the_file_shows(result, card, tmp_path):
     assert record["volume_cm3"] == pytest.approx(result.volume_cm3, abs=1e-3)
     assert record["length_unit"] == "mm"
     assert record["program"] == f"naisr-viewer {__version__}"
+
+
+def changes(result: SurfaceResult) -> np.ndarray:
+    """A number at each vertex."""
+    return np.linspace(-2, 5, len(result.points_mm), dtype=np.float32)
+
+
+def coloured(result: SurfaceResult) -> SurfaceResult:
+    """The same as the change since 60 months, with a number at each vertex."""
+    before = (0, (("age", 60.0), ("weight", 20.0), ("sex", 1.0)))
+    request = replace(result.request, panel=Panel("change"), before=before)
+    return replace(result, request=request, colouring=Colouring(changes(result), 3.0, "signed"))
+
+
+@pytest.mark.parametrize("ending", FORMATS)
+def test_numbers_on_a_surface_are_in_the_file_or_the_record_says_that_they_are_not(
+    result, card, tmp_path, ending
+):
+    change = coloured(result)
+    path, beside = export.write_surface(tmp_path / f"change.{ending}", change, card)
+    numbers = json.loads(beside.read_text(encoding="utf-8"))["numbers"]
+    assert (numbers["name"], numbers["unit"], numbers["colour_scale_ends_at"]) == ("change_mm", "mm", 3.0)
+    assert numbers["in_file"] == (ending in ("ply", "vtp"))
+    if ending == "vtp":
+        np.testing.assert_array_equal(pv.read(path).point_data["change_mm"], changes(result))
+    if ending == "ply":
+        raw = trimesh.load_mesh(path).metadata["_ply_raw"]["vertex"]["data"]
+        np.testing.assert_array_equal(raw["change_mm"], changes(result))
+    assert read(path).volume == pytest.approx(
+        trimesh.Trimesh(result.points_mm, result.faces).volume, rel=1e-4
+    )
+
+
+def test_a_change_records_what_it_is_counted_from(result, card):
+    record = export.description(coloured(result), card, "x.ply")
+    assert record["before"]["covariates"]["age"] == {"value": 60.0, "unit": "months"}
+    assert record["before"]["patient"] is None
+    assert export.description(result, card, "x.ply")["before"] is None
+
+
+@pytest.mark.parametrize("ending", FORMATS)
+def test_a_cloud_of_points_goes_where_points_can_be(result, card, tmp_path, ending):
+    cloud = replace(
+        coloured(result), faces=np.zeros((0, 3), np.int64), volume_cm3=0.0, origin=Origin.MEASURED
+    )
+    path = tmp_path / f"scan.{ending}"
+    if ending not in ("ply", "vtp"):
+        with pytest.raises(InputError, match="export it as ply or vtp"):
+            export.write_surface(path, cloud, card)
+        assert not path.exists()
+        return
+    _, beside = export.write_surface(path, cloud, card)
+    np.testing.assert_allclose(pv.read(path).points, result.points_mm, rtol=1e-5)
+    record = json.loads(beside.read_text(encoding="utf-8"))
+    assert record["volume_cm3"] is None and record["volume_of_triangles_cm3"] is None
 
 
 def test_an_effect_records_the_others_at_their_mean(engine, card):

@@ -161,6 +161,38 @@ def test_undo_and_reset_by_keyboard(ready, qtbot):
     wait_idle(qtbot, controller)
 
 
+def test_keys_and_clicks_reach_the_window_while_a_number_is_typed(ready, qtbot):
+    """What people do: type a value, press Enter, undo it, type another, click the shapes."""
+    window, controller = ready
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow)
+    box = window.covariates.rows["age"].box
+
+    def write(text: str) -> None:
+        QTest.mouseClick(box, Qt.MouseButton.LeftButton)
+        QTest.keyClick(box, Qt.Key.Key_A, Qt.KeyboardModifier.ControlModifier)
+        QTest.keyClicks(box, text)
+
+    write("153.5")
+    QTest.keyClick(box, Qt.Key.Key_Return)
+    assert controller.state.values[0] == 153.5 and box.text() == "153.5" and box.hasFocus()
+    for keys, modifiers, age in (
+        (Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier, 100.0),
+        (Qt.Key.Key_Y, Qt.KeyboardModifier.ControlModifier, 153.5),
+        (Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier, 100.0),
+        (Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier, 153.5),
+    ):
+        QTest.keyClick(box, keys, modifiers)
+        assert controller.state.values[0] == age and box.value == age
+    write("7")
+    QTest.keyClick(box, Qt.Key.Key_Escape)
+    assert box.text() == "153.5" and controller.state.values[0] == 153.5
+    write("60,5")
+    QTest.mouseClick(window.shapes.canvas, Qt.MouseButton.LeftButton, pos=QPoint(200, 200))
+    assert not box.hasFocus() and controller.state.values[0] == 60.5
+    qtbot.waitUntil(lambda: not controller.is_moving and not controller.is_busy, timeout=10_000)
+
+
 def test_layouts_and_views_by_menu(ready, qtbot):
     window, controller = ready
     press_keys(window, "Ctrl+2")

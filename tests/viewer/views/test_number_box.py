@@ -8,9 +8,10 @@ import pytest
 from PySide6.QtCore import QLocale, QPoint, QPointF, Qt
 from PySide6.QtGui import QKeySequence, QShortcut, QWheelEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QLineEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QLineEdit, QToolTip, QVBoxLayout, QWidget
 
 from naisr_model.covariates import Covariate
+from naisr_viewer.views.actions import COMMANDS
 from naisr_viewer.views.number_box import NumberBox, parsed
 
 AGE = Covariate("age", "months", "continuous", 117.0, 60.0, (1.0, 233.0))
@@ -37,6 +38,7 @@ def stage(qtbot):
     stage.show()
     qtbot.waitExposed(stage)
     stage.activateWindow()
+    qtbot.waitUntil(stage.isActiveWindow)  # only then it hears keys
     return stage
 
 
@@ -53,6 +55,7 @@ def enter(box: NumberBox) -> None:
 @pytest.mark.parametrize(
     ("text", "value"),
     [
+        ("12.345", 12.345),
         ("62.5", 62.5),
         ("62,5", 62.5),
         ("6e1", 60.0),
@@ -73,6 +76,7 @@ def test_a_number_in_range_is_taken_as_it_was_typed(stage, text, value, language
     finally:
         QLocale.setDefault(usual)
     assert stage.heard == [value] and stage.box.value == value and not stage.box.complaint
+    assert stage.box.text() == f"{value:g}"  # nothing else is shown than what was taken
 
 
 @pytest.mark.parametrize(
@@ -82,6 +86,7 @@ def test_what_cannot_be_taken_stays_and_is_marked(stage, text):
     write(stage.box, text)
     assert stage.box.text() == text
     enter(stage.box)
+    assert QToolTip.isVisible() and "1 to 233 months" in QToolTip.text()  # without being hovered over
     stage.other.setFocus()
     assert stage.heard == [] and stage.box.text() == text
     assert stage.box.property("isWrong")
@@ -109,7 +114,10 @@ def test_escape_takes_back_what_was_typed_and_only_then_belongs_to_the_window(st
     assert escapes == [1]
 
 
-@pytest.mark.parametrize("keys", ["Ctrl+Z", "Ctrl+Shift+Z", "Ctrl+E", "Ctrl+Y"])
+SHORTCUTS = [keys for command in COMMANDS for keys in command.keys]
+
+
+@pytest.mark.parametrize("keys", SHORTCUTS)
 def test_the_window_s_shortcuts_work_while_the_box_has_the_focus(stage, keys):
     pressed: list[str] = []
     QShortcut(QKeySequence(keys), stage, lambda: pressed.append(keys))
@@ -117,6 +125,38 @@ def test_the_window_s_shortcuts_work_while_the_box_has_the_focus(stage, keys):
     enter(stage.box)
     QTest.keySequence(stage.box, QKeySequence(keys))
     assert pressed == [keys] and stage.box.text() == "120"
+
+
+@pytest.mark.parametrize("keys", [keys for keys in SHORTCUTS if keys[-1] not in "ZY"])
+def test_all_but_undo_work_while_something_is_being_typed(stage, keys):
+    pressed: list[str] = []
+    QShortcut(QKeySequence(keys), stage, lambda: pressed.append(keys))
+    write(stage.box, "120")
+    QTest.keySequence(stage.box, QKeySequence(keys))
+    assert pressed == [keys] and stage.box.text() == "120"
+
+
+def test_undo_is_of_the_typing_until_that_is_taken(stage):
+    pressed: list[int] = []
+    QShortcut(QKeySequence("Ctrl+Z"), stage, lambda: pressed.append(1))
+    write(stage.box, "12")
+    QTest.keySequence(stage.box, QKeySequence("Ctrl+Z"))
+    assert stage.box.text() == "100" and pressed == []
+    QTest.keySequence(stage.box, QKeySequence("Ctrl+Z"))
+    assert pressed == [1]
+
+
+def test_a_taken_number_cannot_be_undone_by_the_box_where_the_window_has_no_undo(stage):
+    write(stage.box, "120")
+    enter(stage.box)
+    QTest.keySequence(stage.box, QKeySequence("Ctrl+Z"))
+    assert stage.box.text() == "120" and stage.box.value == 120.0
+
+
+def test_the_same_number_written_otherwise_is_finished_too(stage):
+    write(stage.box, "100.0")
+    enter(stage.box)
+    assert stage.box.text() == "100" and stage.heard == [] and not stage.box.isModified()
 
 
 def test_an_emptied_box_shows_its_value_again(stage):
@@ -140,6 +180,14 @@ def test_a_value_keeps_the_digits_that_are_not_shown(stage):
     assert stage.box.text() == "3" and stage.box.value == 2.58370001
     stage.other.setFocus()
     assert stage.heard == []
+
+
+def test_the_digits_that_are_shown_can_be_typed(stage):
+    stage.box.show_value(100.3841275512)
+    assert stage.box.text() == "100"
+    write(stage.box, "100")
+    enter(stage.box)
+    assert stage.heard == [100.0] and stage.box.value == 100.0
 
 
 def test_arrows_step_inside_the_range(stage):

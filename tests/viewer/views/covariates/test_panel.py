@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QColor
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLabel
+from PySide6.QtWidgets import QLabel, QScrollArea
 from pytestqt.qtbot import QtBot
 
 from naisr_viewer.state.atlas_card import AtlasCard
@@ -102,6 +102,28 @@ def test_several_keys_are_one_change(panel, heard, qtbot):
     assert heard[-1][2] == heard[2][2]
 
 
+def test_the_wheel_scrolls_and_changes_nothing(panel, heard):
+    panel.resize(cp.PANEL_WIDTH, 200)
+    panel.rows["age"].slider.setFocus()
+    area = panel.findChild(QScrollArea)
+    place = panel.rows["age"].slider.mapTo(panel, panel.rows["age"].slider.rect().center())
+    QTest.wheelEvent(panel.windowHandle(), QPointF(place), QPoint(0, -120))
+    QTest.qWait(20)
+    assert heard == [] and area.verticalScrollBar().value() > 0
+
+
+def test_values_are_as_round_as_they_are_shown(panel, heard):
+    for name, step in (("age", 1.0), ("weight", 0.1)):
+        slider = panel.rows[name].slider
+        for share in (0.137, 0.503, 0.911):
+            QTest.mouseClick(slider, Qt.MouseButton.LeftButton, pos=at(slider, share))
+            value = heard[-1][2]
+            assert value == pytest.approx(step * round(value / step), abs=1e-9)
+            assert float(panel.rows[name].covariate.format(value).split()[0]) == pytest.approx(value)
+        QTest.mouseClick(slider, Qt.MouseButton.LeftButton, pos=at(slider, 1.0))
+        assert heard[-1][2] == panel.rows[name].covariate.range[1]
+
+
 def test_a_typed_number_is_taken_exactly(panel, heard, qtbot):
     box = panel.rows["weight"].box
     box.selectAll()
@@ -147,7 +169,7 @@ def test_units_and_colours_are_on_every_row(panel, card):
 def test_another_atlas_replaces_the_rows(panel, card, qtbot):
     old = panel.rows["age"]
     panel.show_atlas(card, LIGHT)
-    assert panel.rows["age"] is not old
+    assert panel.rows["age"] is not old and not old.isVisible()  # at once, not with the next event
     assert list(panel.rows) == ["age", "weight", "sex"]
 
 

@@ -2,29 +2,42 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import pytest
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QFileDialog, QPushButton
 
 from naisr_viewer.panels.kinds import panels_in
+from naisr_viewer.state.explorer import ExplorerState, opened
 from naisr_viewer.state.layouts import TEMPLATE, Layout, Panel
 from naisr_viewer.state.requests import EXACT_RESOLUTION
 from naisr_viewer.views.dialogs.export import ExportDialog
 
 
-def test_all_views_are_proposed_as_they_are_on_screen(qtbot, card):
-    dialog = ExportDialog(card)
+@pytest.fixture
+def state(card) -> ExplorerState:
+    return opened(ExplorerState(), card)
+
+
+@pytest.mark.parametrize("layout", Layout)
+def test_all_views_are_proposed_as_they_are_on_screen(qtbot, card, state, layout):
+    dialog = ExportDialog(replace(state, layout=layout))
     qtbot.addWidget(dialog)
     choice = dialog.choice()
-    assert choice.panels == panels_in(Layout.SIDE_BY_SIDE, card)
+    assert choice.panels == panels_in(layout, card)
+    each = [dialog.what.itemData(index) for index in range(1, dialog.what.count())]
+    assert sorted(each, key=str) == sorted(
+        {(panel,) for panel in (*panels_in(layout, card), *panels_in(Layout.SIDE_BY_SIDE, card))}, key=str
+    )
     assert choice.resolution == EXACT_RESOLUTION
     assert choice.folder == Path.home()
 
 
-def test_one_view_is_chosen_with_format_detail_and_folder(qtbot, card, monkeypatch, tmp_path):
-    dialog = ExportDialog(card)
+def test_one_view_is_chosen_with_format_detail_and_folder(qtbot, state, monkeypatch, tmp_path):
+    dialog = ExportDialog(state)
     qtbot.addWidget(dialog)
     monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(tmp_path))
     for name, panel in (("Template", TEMPLATE), ("Sex only", Panel("effect", "sex"))):
@@ -38,8 +51,21 @@ def test_one_view_is_chosen_with_format_detail_and_folder(qtbot, card, monkeypat
     assert (choice.format, choice.resolution, choice.folder) == ("ply", 256, tmp_path)
 
 
-def test_a_cancelled_dialog_chooses_nothing(qtbot, card):
-    dialog = ExportDialog(card)
+def test_a_cancelled_dialog_chooses_nothing(qtbot, state):
+    dialog = ExportDialog(state)
     qtbot.addWidget(dialog)
     QTimer.singleShot(0, lambda: QTest.keyClick(dialog, Qt.Key.Key_Escape))
     assert dialog.ask() is None
+
+
+def test_a_folder_is_named_before_anything_is_written(qtbot, state, monkeypatch, tmp_path):
+    dialog = ExportDialog(state)
+    qtbot.addWidget(dialog)
+    (button,) = [each for each in dialog.findChildren(QPushButton) if each.text() == "Export"]
+    dialog.folder.setText("  ")
+    assert not button.isEnabled()
+    monkeypatch.chdir(tmp_path)
+    for typed, folder in (("out", tmp_path / "out"), ("~/x", Path.home() / "x"), ("~nobody?/x", None)):
+        dialog.folder.setText(typed)
+        assert button.isEnabled()
+        assert dialog.choice().folder == (folder or tmp_path / "~nobody?" / "x")

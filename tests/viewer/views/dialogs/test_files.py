@@ -10,7 +10,8 @@ from pytestqt.qtbot import QtBot
 
 from naisr_model.data import meshes, volumes
 from naisr_model.data.patients import POINT_ENDINGS
-from naisr_viewer.views.dialogs.files import SCAN_ENDINGS, ask_scan_path
+from naisr_viewer.state.explorer import ExplorerState
+from naisr_viewer.views.dialogs.files import SCAN_ENDINGS, ask_image_path, ask_scan_path
 
 
 @pytest.fixture
@@ -32,3 +33,18 @@ def test_every_ending_that_the_model_reads_can_be_chosen(parent, monkeypatch):
     monkeypatch.setattr(QFileDialog, "getOpenFileName", answer)
     assert ask_scan_path(parent) == Path("/scans/p01.stl")
     assert all(f"*{ending}" in offered[0] for ending in readable)
+
+
+@pytest.mark.parametrize(
+    ("typed", "name"),
+    [
+        ("fig", "fig.png"),
+        ("fig.png", "fig.png"),
+        ("fig.PNG", "fig.PNG"),
+        ("fig.age150", "fig.age150.png"),
+        ("fig.", "fig..png"),
+    ],
+)
+def test_a_picture_gets_an_ending_and_loses_none(parent, monkeypatch, typed, name):
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (f"/pictures/{typed}", ""))
+    assert ask_image_path(parent, ExplorerState()) == Path(f"/pictures/{name}")

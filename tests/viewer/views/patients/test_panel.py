@@ -301,6 +301,29 @@ def test_a_tick_proposes_the_mean_to_be_typed_over(panel, start, qtbot):
     assert sex.note.text() == ""
 
 
+def test_escape_leaves_a_field_as_if_nothing_had_been_typed(panel, start):
+    panel.show_state(with_patient(start, ONE))
+    write(field(panel, "age"), "84.5")
+    assert panel.known.rows["age"].check.isChecked()
+    QTest.keyClick(field(panel, "age"), Qt.Key.Key_Escape)
+    assert not panel.known.rows["age"].check.isChecked() and panel.known.given() == ()
+    write(field(panel, "age"), "84.5")
+    QTest.keyClick(field(panel, "age"), Qt.Key.Key_Return)
+    write(field(panel, "age"), "9")
+    QTest.keyClick(field(panel, "age"), Qt.Key.Key_Escape)
+    QTest.keyClick(field(panel, "age"), Qt.Key.Key_Tab)
+    assert panel.known.given() == (("age", 84.5),) and field(panel, "age").text() == "84.5"
+
+
+def test_what_was_typed_comes_back_with_a_closed_patient(panel, start):
+    opened_one = with_patient(start, ONE)
+    panel.show_state(opened_one)
+    write(field(panel, "age"), "84.5")
+    panel.show_state(without_patient(opened_one, 1))
+    panel.show_state(opened_one)
+    assert panel.known.given() == (("age", 84.5),)
+
+
 def test_arrow_keys_begin_at_the_mean(panel, start):
     panel.show_state(with_patient(start, ONE))
     age = field(panel, "age")
