@@ -83,9 +83,8 @@ def style_sheet(theme: Theme) -> str:
     #title {{ font-size: 15pt; font-weight: 600; }}
     #covariate {{ font-weight: 600; }}
     #muted {{ color: {t.muted}; }}
-    #panelTitle {{ font-weight: 600; color: {t.text}; background: {t.canvas}; padding-left: 10px; }}
-    #caption {{ color: {t.text}; background: {t.canvas}; }}
-    #status {{ padding-left: 12px; }}
+    #panelTitle {{ font-weight: 600; color: {t.text}; }}
+    #caption {{ color: {t.text}; }}
     #separator {{ background: {t.line}; }}
     #canvasArea {{ background: {t.canvas}; }}
     #dropZone {{ border: 2px dashed {t.line}; border-radius: 14px; }}
