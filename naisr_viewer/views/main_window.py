@@ -33,6 +33,7 @@ from naisr_viewer.views.dialogs.export import ExportDialog
 from naisr_viewer.views.dialogs.files import ask_image_path, ask_open_path, ask_scan_path, dropped, is_atlas
 from naisr_viewer.views.dialogs.label import ask_label
 from naisr_viewer.views.dialogs.replace import ask_replace
+from naisr_viewer.views.focus import FocusRest, in_order
 from naisr_viewer.views.patients.panel import PatientPanel
 from naisr_viewer.views.recent_menu import RecentMenu
 from naisr_viewer.views.shapes.shape_view import ShapeView
@@ -72,6 +73,7 @@ class MainWindow(QMainWindow):
         self._theme_choice = ThemeChoice.SYSTEM
         self._has_appeared = False
         self._documents: DocumentWindow | None = None
+        self._focus = FocusRest(self)
         self._is_editable, self._can_undo, self._can_redo = True, False, False
         self.covariates = CovariatePanel(self)
         self.shapes = ShapeView(self)
@@ -98,6 +100,7 @@ class MainWindow(QMainWindow):
             self.shapes.show_atlas(state.atlas, theme)
             self.setWindowTitle(f"{state.atlas.name} — {TITLE}")
             offer(COMMANDS, self._actions, state.atlas)
+            in_order(self._stops)
         self._centre.show_shapes(state.atlas is not None)
         self.scale.setVisible(state.atlas is not None)
         self.covariates.show_values(state)
@@ -122,6 +125,12 @@ class MainWindow(QMainWindow):
             self.shapes.show_ghost(None)
         else:
             self.shapes.show_ghost(scan.points_mm, scan.faces)
+
+    @property
+    def _stops(self) -> list[QWidget]:
+        """What the Tab key goes through, as it is read: the panels from left to right, then what is below."""
+        centre = [*self._centre.stops, self.shapes.row_bar]
+        return [*self.covariates.stops, *centre, *self.patients.stops, self.cancel]
 
     def show_history(self, can_undo: bool, can_redo: bool) -> None:
         """Enable what can be undone and redone."""
@@ -170,10 +179,15 @@ class MainWindow(QMainWindow):
 
     def set_editable(self, editable: bool) -> None:
         """Whether covariates and patients can be changed just now; what would end the work rests, too."""
+        focused = self.focusWidget()
         self.covariates.setEnabled(editable)
         self.patients.set_editable(editable)
         self._is_editable = editable
         self._enable()
+        if editable:
+            self._focus.end()
+        else:
+            self._focus.begin(focused)
 
     def _enable(self) -> None:
         """Enable the commands that make sense."""
@@ -248,7 +262,7 @@ class MainWindow(QMainWindow):
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(0)
         row.addWidget(self.covariates)
-        row.addWidget(self._centre, 1)
+        row.addWidget(self._centre)
         row.addWidget(self.patients)
         self.setCentralWidget(body)
         self.setStatusBar(self._below)

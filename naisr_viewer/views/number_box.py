@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QLineEdit, QWidget
 
 from naisr_model.covariates import Covariate
 from naisr_viewer.words.numbers import decimals
-from naisr_viewer.words.titles import label
+from naisr_viewer.words.titles import as_tip, label
 
 WIDTH_PX = 76
 NUMBER = re.compile(r"[-+−]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+−]?\d+)?")
@@ -151,7 +151,7 @@ class NumberBox(QLineEdit):
 
     def _mark(self) -> None:
         low, high = self.covariate.range
-        self.setToolTip(self.complaint or f"{low:g} to {self.covariate.format(high)}")
+        self.setToolTip(as_tip(self.complaint or f"{low:g} to {self.covariate.format(high)}"))
         self.setProperty("isWrong", bool(self.complaint))
         self.style().unpolish(self)
         self.style().polish(self)

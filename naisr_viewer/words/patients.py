@@ -9,8 +9,8 @@ from naisr_viewer.state.patients import Fitted, Method, Scan
 from naisr_viewer.words.numbers import capitalised, reading, volume
 from naisr_viewer.words.titles import label
 
-LONGEST_WORD = 28
-"""Letters that surely fit into a line; longer names are broken anywhere."""
+LONGEST_WORD, LONGEST_IN_TABLE = 28, 14
+"""Letters that surely fit into a line, and into half of one; longer names are broken anywhere."""
 
 METHODS: tuple[tuple[Method, str], ...] = (
     ("none", "as in the file"),
@@ -72,6 +72,6 @@ def sentence(text: str) -> str:
     return breakable(capitalised(text))
 
 
-def breakable(text: str) -> str:
-    """``text`` with words that can be broken anywhere, where they would not fit into a line."""
-    return " ".join("\u200b".join(word) if len(word) > LONGEST_WORD else word for word in text.split(" "))
+def breakable(text: str, longest: int = LONGEST_WORD) -> str:
+    """``text`` with words of more letters than the ``longest`` that can be broken anywhere."""
+    return " ".join("\u200b".join(word) if len(word) > longest else word for word in text.split(" "))

@@ -12,11 +12,10 @@ def label(name: str) -> str:
 
 
 def as_tip(text: str) -> str:
-    """``text`` for a tool tip, to be shown as it is written.
-
-    Qt takes words such as ``<b>`` in a tip for markup, and breaks plain lines nowhere.
-    """
-    return f"<p style='white-space: pre-wrap'>{html.escape(text, quote=False)}</p>" if text else ""
+    """``text`` for a tool tip, shown as it is written: Qt takes words such as ``<b>`` there for markup."""
+    if "<" not in text and "&" not in text:
+        return text
+    return f"<p style='white-space: pre-wrap'>{html.escape(text, quote=False)}</p>"
 
 
 def as_entry(text: str) -> str:

@@ -14,7 +14,7 @@ from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.layouts import Panel
 from naisr_viewer.state.requests import SurfaceResult
 from naisr_viewer.views.colours import panel_colour
-from naisr_viewer.views.elided_label import ElidedLabel
+from naisr_viewer.views.elided import ElidedLabel
 from naisr_viewer.views.shapes.arrangement import CAPTION_PX, TITLE_PX
 from naisr_viewer.views.shapes.colour_bar import HEIGHT_PX, WIDTH_PX, ColourBar
 
@@ -40,7 +40,7 @@ class Title(ElidedLabel):
         super().__init__(text, parent)
         self._colour = QColor(colour)
         self.setObjectName("panelTitle")
-        self.setContentsMargins(MARGIN_PX + 2 * DOT_PX, 0, MARGIN_PX, 0)
+        self.keep_free(MARGIN_PX + 2 * DOT_PX, MARGIN_PX)
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """The dot before the words."""

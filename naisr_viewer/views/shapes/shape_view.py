@@ -63,12 +63,12 @@ class ShapeView(QWidget):
         self._fit_scale = 1.0
         self._height = 1
         self._pixels_per_mm = 0.0
-        self._scroll = row_scroll(self)
-        self._scroll.valueChanged.connect(lambda _: self._arrange())
+        self.row_bar = row_scroll(self)
+        self.row_bar.valueChanged.connect(lambda _: self._arrange())
         self._area = QHBoxLayout(self)
         self._area.setContentsMargins(0, 0, 0, 0)
         self._area.setSpacing(0)
-        self._area.addWidget(self._scroll, 0, Qt.AlignmentFlag.AlignRight)
+        self._area.addWidget(self.row_bar, 0, Qt.AlignmentFlag.AlignRight)
 
     @property
     def canvas(self) -> Canvas | None:
@@ -98,7 +98,7 @@ class ShapeView(QWidget):
         """Put these sub-plots on screen and hide the others."""
         if tuple(panels) != self._visible:
             self._visible = tuple(panels)
-            self._scroll.setValue(0)
+            self.row_bar.setValue(0)
             self._arrange()
             self._looked_after = False
             self._look_after()
@@ -241,8 +241,8 @@ class ShapeView(QWidget):
         wide_mm, high_mm = self._seen_mm
         strip = strip_height(self._visible)
         rows, room = self._rows(strip, wide_mm / high_mm)
-        show_rows(self._scroll, rows)
-        places = areas_for(len(self._visible), room, rows, self._scroll.value())
+        show_rows(self.row_bar, rows)
+        places = areas_for(len(self._visible), room, rows, self.row_bar.value())
         areas = {panel: area for panel, area in zip(self._visible, places, strict=True) if area is not None}
         first = next(iter(areas.values()))
         self._height = first.height()
@@ -259,7 +259,7 @@ class ShapeView(QWidget):
         rows = rows_for(len(self._visible), self.size(), strip, aspect)
         if rows.in_sight == rows.total:
             return rows, self.size()
-        room = QSize(self.width() - self._scroll.sizeHint().width(), self.height())
+        room = QSize(self.width() - self.row_bar.sizeHint().width(), self.height())
         return rows_for(len(self._visible), room, strip, aspect), room
 
     def _tell_drawn(self, count: int) -> None:
