@@ -2,15 +2,37 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QScrollArea, QSizePolicy, QWidget
+import math
 
-from naisr_viewer.words.patients import breakable
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QResizeEvent, QTextOption
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QTextEdit, QWidget
 
 LEAST_PX = 36
 MOST_PX = 120
 """Height of a message; a longer one is scrolled."""
+
+
+class Message(QTextEdit):
+    """Words over as many lines as there is room for; paths are broken anywhere, and can be copied whole."""
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setReadOnly(True)
+        self.setTabChangesFocus(True)
+        self.setMinimumWidth(LEAST_PX)
+        self.setAccessibleName("What went wrong")
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setWordWrapMode(QTextOption.WrapMode.WrapAtWordBoundaryOrAnywhere)
+
+    def text(self) -> str:
+        """What it says."""
+        return self.toPlainText()
+
+    @property
+    def height_px(self) -> int:
+        """Of all lines at the present width."""
+        return math.ceil(self.document().size().height()) + 2 * self.frameWidth() + 2
 
 
 class ErrorBar(QFrame):
@@ -19,32 +41,23 @@ class ErrorBar(QFrame):
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
         self.setObjectName("errorBar")
-        self.text = QLabel(self)
-        self.text.setWordWrap(True)
-        self.text.setTextFormat(Qt.TextFormat.PlainText)
-        self.text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self.text.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        self._area = QScrollArea(self)
-        self._area.setWidget(self.text)
-        self._area.setWidgetResizable(True)
-        self._area.setMinimumWidth(LEAST_PX)
-        self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.text = Message(self)
         self.dismiss = QPushButton("Dismiss", self)
         self.dismiss.clicked.connect(lambda: self.show_message(""))
         row = QHBoxLayout(self)
         row.setContentsMargins(14, 8, 10, 8)
-        row.addWidget(self._area, 1)
+        row.addWidget(self.text, 1)
         row.addWidget(self.dismiss, 0, Qt.AlignmentFlag.AlignTop)
         self.hide()
 
     @property
     def stops(self) -> list[QWidget]:
         """What the Tab key goes through, as it is read."""
-        return [self._area, self.dismiss]
+        return [self.text, self.dismiss]
 
     def show_message(self, message: str) -> None:
         """Say what went wrong; an empty message hides the bar."""
-        self.text.setText(breakable(message))
+        self.text.setPlainText(message)
         self.setVisible(bool(message))
         self._make_room()
 
@@ -54,5 +67,5 @@ class ErrorBar(QFrame):
         self._make_room()
 
     def _make_room(self) -> None:
-        wanted = self.text.heightForWidth(self._area.viewport().width())
-        self._area.setFixedHeight(min(max(wanted, self.dismiss.sizeHint().height()), MOST_PX))
+        least = self.dismiss.sizeHint().height()
+        self.text.setFixedHeight(min(max(self.text.height_px, least), MOST_PX))

@@ -96,6 +96,7 @@ def style_sheet(theme: Theme) -> str:
     #dropZone {{ border: 2px dashed {t.line}; border-radius: 14px; }}
     #emptyTitle {{ font-size: 18pt; font-weight: 600; }}
     #errorBar {{ background: {t.error}; }}
-    #errorBar QLabel {{ color: {t.on_error}; }}
+    #errorBar QTextEdit {{ background: transparent; color: {t.on_error}; border: 1px solid transparent; }}
+    #errorBar QTextEdit:focus, #errorBar QPushButton:focus {{ border: 2px solid {t.on_error}; }}
     #errorBar QPushButton {{ background: transparent; color: {t.on_error}; border-color: {t.on_error}; }}
     """
