@@ -7,7 +7,7 @@ centred number ``c_i`` of the paper, where 0 is the population centre.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -91,11 +91,11 @@ class Covariate:
         return value
 
     def format(self, value: float) -> str:
-        """The value as people write it, with its unit: ``120 months``, ``M``, ``between F and M``."""
+        """The value as people write it, with its unit: ``120 months``, ``M``, ``halfway between F and M``."""
         if self.kind == "binary":
             if abs(value) == 1:
                 return self.levels[int(value > 0)]
-            return f"between {self.levels[0]} and {self.levels[1]} ({value:+.2f})"
+            return _in_between(self.levels, value)
         return f"{value:.4g} {self.unit}".rstrip()
 
     def to_json(self) -> dict[str, Any]:
@@ -227,6 +227,32 @@ class Population:
             values=values.reshape(len(record["subjects"]), len(covariates)),
             held_out=np.asarray(record["held_out"], dtype=bool),
         )
+
+
+def interval_in_words(
+    covariate: Covariate, low: float, high: float, told: Callable[[Covariate, float], str] = Covariate.format
+) -> str:
+    """``18.2 to 24.9 kg``; of a binary covariate the levels that are possible: ``F or M``.
+
+    Args:
+        covariate: whose values these are.
+        low: its low end, real units.
+        high: its high end.
+        told: one value with its unit in words.
+    """
+    start, end = told(covariate, low), told(covariate, high)
+    if start == end:
+        return end
+    if covariate.kind == "binary":
+        return f"{start} or {end}"
+    return f"{start.removesuffix(covariate.unit).rstrip()} to {end}"
+
+
+def _in_between(levels: tuple[str, str], value: float) -> str:
+    share = round(100 * abs(value))
+    if not share:
+        return f"halfway between {levels[0]} and {levels[1]}"
+    return f"between {levels[0]} and {levels[1]}, {share} % towards {levels[int(value > 0)]}"
 
 
 def require_known(names: Iterable[str], covariates: Iterable[Covariate]) -> None:

@@ -19,6 +19,7 @@ from naisr_viewer.state.explorer import showing, with_patient, without_patient
 from naisr_viewer.state.layouts import Layout
 from naisr_viewer.state.patients import Fitted, Labels, Named, OpenScan, Reading, Scan
 from naisr_viewer.views.main_window import MainWindow
+from naisr_viewer.words.numbers import reach
 from naisr_viewer.words.titles import label
 
 
@@ -127,11 +128,10 @@ class PatientDesk(QObject):
         for name, value in known:
             covariate = atlas.covariates[atlas.index(name)]
             if not covariate.contains(value):
-                low, high = covariate.range
                 told = "no number" if math.isnan(value) else covariate.format(value)
                 self._window.show_error(
-                    f"{label(name)} is {told}; the atlas was made from {low:g} to "
-                    f"{covariate.format(high)}. Correct it, or untick it to have it inferred."
+                    f"{label(name)} is {told}; the atlas was made from {reach(covariate)}. "
+                    "Correct it, or untick it to have it inferred."
                 )
                 return True
         return False

@@ -30,7 +30,15 @@ from naisr_viewer.views.covariates.panel import CovariatePanel
 from naisr_viewer.views.dialogs.about import about
 from naisr_viewer.views.dialogs.documents import DocumentWindow
 from naisr_viewer.views.dialogs.export import ExportDialog
-from naisr_viewer.views.dialogs.files import ask_image_path, ask_open_path, ask_scan_path, dropped, is_atlas
+from naisr_viewer.views.dialogs.files import (
+    ask_image_path,
+    ask_open_path,
+    ask_scan_path,
+    dropped,
+    is_atlas,
+    is_scan,
+)
+from naisr_viewer.views.dialogs.instead import ask_instead
 from naisr_viewer.views.dialogs.label import ask_label
 from naisr_viewer.views.dialogs.replace import ask_replace
 from naisr_viewer.views.focus import FocusRest, in_order
@@ -197,13 +205,19 @@ class MainWindow(QMainWindow):
     def ask_atlas(self) -> None:
         """Let an atlas be chosen and opened."""
         path = ask_open_path(self)
-        if path is not None:
+        if path is not None and is_scan(path):
+            if ask_instead(self, path, "scan"):
+                self.scan_requested.emit(path)
+        elif path is not None:
             self.open_requested.emit(path)
 
     def ask_scan(self) -> None:
         """Let a patient's file be chosen and opened."""
         path = ask_scan_path(self)
-        if path is not None:
+        if path is not None and is_atlas(path):
+            if ask_instead(self, path, "atlas"):
+                self.open_requested.emit(path)
+        elif path is not None:
             self.scan_requested.emit(path)
 
     def ask_export(self) -> None:

@@ -10,7 +10,7 @@ from PySide6.QtGui import QFocusEvent, QKeyEvent, QWheelEvent
 from PySide6.QtWidgets import QLineEdit, QWidget
 
 from naisr_model.covariates import Covariate
-from naisr_viewer.words.numbers import decimals
+from naisr_viewer.words.numbers import decimals, reach
 from naisr_viewer.words.titles import as_tip, label
 
 WIDTH_PX = 76
@@ -62,9 +62,8 @@ class NumberBox(QLineEdit):
         value = self.value
         if value is None or self.covariate.contains(value):
             return ""
-        low, high = self.covariate.range
         told = "no number" if math.isnan(value) else "outside the data behind the atlas"
-        return f"“{self.text()}” is {told}: {low:g} to {self.covariate.format(high)}"
+        return f"“{self.text()}” is {told}: {reach(self.covariate)}"
 
     @property
     def step(self) -> float:
@@ -150,8 +149,7 @@ class NumberBox(QLineEdit):
         return "" if value is None else f"{value:.{decimals(self.covariate)}f}"
 
     def _mark(self) -> None:
-        low, high = self.covariate.range
-        self.setToolTip(as_tip(self.complaint or f"{low:g} to {self.covariate.format(high)}"))
+        self.setToolTip(as_tip(self.complaint or reach(self.covariate)))
         self.setProperty("isWrong", bool(self.complaint))
         self.style().unpolish(self)
         self.style().polish(self)

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import math
 
-from naisr_model.covariates import Covariate
+from naisr_model.covariates import Covariate, interval_in_words
 from naisr_model.errors import InputError
+
+SLACK = 1e-6
+"""Of a step that is told: so little beyond the end of a range is rounding."""
 
 
 def decimals(covariate: Covariate) -> int:
@@ -21,14 +24,43 @@ def reading(covariate: Covariate, value: float) -> str:
     return f"{value:.{decimals(covariate)}f} {covariate.unit}".rstrip()
 
 
+def reach(covariate: Covariate) -> str:
+    """The observed range, rounded inwards, so that its ends can be given: ``2.6 to 91.4 kg``, ``F or M``."""
+    if covariate.kind == "binary":
+        return " or ".join(covariate.levels)
+    low, high = covariate.range
+    step = 10.0 ** decimals(covariate)
+    ends = math.ceil(low * step - SLACK) / step, math.floor(high * step + SLACK) / step
+    low, high = ends if ends[0] < ends[1] else (low, high)
+    return f"{low:.10g} to {high:.10g} {covariate.unit}".rstrip()
+
+
+def interval_reading(covariate: Covariate, low: float, high: float) -> str:
+    """A 95 % interval: ``95 %: 18.2 to 24.9 kg``; of a binary covariate the levels it leaves open."""
+    told = interval_in_words(covariate, low, high, reading)
+    if covariate.kind == "binary":
+        return "inferred" if low == high else f"inferred; {told}"
+    return f"95 %: {told}"
+
+
+def length(mm: float) -> str:
+    """A distance with digits that mean something: ``0.08 mm``, ``13.5 mm``, ``2,314 mm``."""
+    digits = 2 if abs(mm) < 9.995 else 1 if abs(mm) < 99.95 else 0
+    return f"{mm:,.{digits}f} mm"
+
+
+def duration(seconds: float) -> str:
+    """``0.49 s``, ``4.2 s``, ``132 s``."""
+    digits = 2 if seconds < 0.995 else 1 if seconds < 9.95 else 0
+    return f"{seconds:,.{digits}f} s"
+
+
 def patient_reading(covariate: Covariate, value: float, interval: tuple[float, float] | None) -> str:
-    """The patient's value in words: ``patient 21.3 kg, 95 %: 18.2 to 24.9``."""
+    """The patient's value in words: ``patient 21.3 kg, 95 %: 18.2 to 24.9 kg``."""
     text = f"patient {reading(covariate, value)}"
     if interval is None:
         return text
-    digits = 2 if covariate.kind == "binary" else decimals(covariate)
-    low, high = (f"{end:.{digits}f}".replace("-", "−") for end in interval)
-    return f"{text}, 95 %: {low} to {high}"
+    return f"{text}, {interval_reading(covariate, *interval)}"
 
 
 def mean_reading(covariate: Covariate) -> str:

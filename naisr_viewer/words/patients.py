@@ -6,11 +6,13 @@ from collections.abc import Sequence
 
 from naisr_model.covariates import Covariate
 from naisr_viewer.state.patients import Fitted, Method, Scan
-from naisr_viewer.words.numbers import capitalised, reading, volume
+from naisr_viewer.words.numbers import capitalised, duration, interval_reading, length, reading, volume
 from naisr_viewer.words.titles import label
 
 LONGEST_WORD, LONGEST_IN_TABLE = 28, 14
 """Letters that surely fit into a line, and into half of one; longer names are broken anywhere."""
+
+RESIDUAL = "mean distance, scan to fitted shape"
 
 METHODS: tuple[tuple[Method, str], ...] = (
     ("none", "as in the file"),
@@ -39,21 +41,13 @@ def measured(scan: Scan) -> str:
     return "open surface, no volume" if len(scan.faces) else "cloud of points, no volume"
 
 
-def interval(covariate: Covariate, low: float, high: float) -> str:
-    """A 95 % interval: ``95 %: 18.2 to 24.9 kg``; of a binary covariate the levels it leaves open."""
-    start, end = reading(covariate, low), reading(covariate, high)
-    if covariate.kind == "binary":
-        return "inferred" if low == high else f"inferred; {start} or {end}"
-    return f"95 %: {start.removesuffix(covariate.unit).strip()} to {end}"
-
-
 def findings(fit: Fitted, covariates: Sequence[Covariate]) -> list[tuple[str, str, str]]:
     """The rows of the result: what, its value with unit, and how sure or what it means."""
     values = dict(fit.values)
     sure = {name: (low, high) for name, low, high in fit.intervals}
     rows = []
     for each in covariates:
-        how = interval(each, *sure[each.name]) if each.name in sure else "known"
+        how = interval_reading(each, *sure[each.name]) if each.name in sure else "known"
         rows.append((label(each.name), reading(each, values[each.name]), how))
     lasting = []
     if fit.lasting is not None:
@@ -61,9 +55,9 @@ def findings(fit: Fitted, covariates: Sequence[Covariate]) -> list[tuple[str, st
     return [
         *rows,
         ("Volume", f"{volume(fit.volume_cm3, fit.volume_margin_cm3)} (95 %)", ""),
-        ("Residual", f"{fit.residual_mm:.2f} mm", "mean distance, scan to fitted surface"),
+        ("Residual", length(fit.residual_mm), RESIDUAL),
         *lasting,
-        ("Time", f"{fit.seconds:.1f} s", ""),
+        ("Time", duration(fit.seconds), ""),
     ]
 
 

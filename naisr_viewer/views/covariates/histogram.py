@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from naisr_model.covariates import Covariate
 from naisr_viewer.views.covariates.slider import HANDLE_PX, track_x
 from naisr_viewer.views.theme import Theme
-from naisr_viewer.words.numbers import mean_reading, patient_reading
+from naisr_viewer.words.numbers import mean_reading, patient_reading, reach
 from naisr_viewer.words.titles import as_tip
 
 BINS = 28
@@ -115,6 +115,4 @@ class Histogram(QWidget):
         if self._covariate.kind == "binary":
             levels = zip(self._counts, self._covariate.levels, strict=True)
             return " · ".join(f"{int(count)} {name}" for count, name in levels)
-        low, high = self._covariate.range
-        where = f"between {low:g} and {high:g} {self._covariate.unit}".rstrip()
-        return f"{int(self._counts.sum())} shapes behind the atlas {where}"
+        return f"{int(self._counts.sum())} shapes behind the atlas, {reach(self._covariate)}"

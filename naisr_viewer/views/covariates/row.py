@@ -14,7 +14,7 @@ from naisr_viewer.views.elided import ElidedLabel, unit_label
 from naisr_viewer.views.level_buttons import LevelButton, level_buttons
 from naisr_viewer.views.number_box import NumberBox
 from naisr_viewer.views.theme import Theme
-from naisr_viewer.words.numbers import mean_reading, reading
+from naisr_viewer.words.numbers import mean_reading, reach, reading
 from naisr_viewer.words.titles import as_tip, label
 
 READING_PX = 150
@@ -53,9 +53,8 @@ class CovariateRow(QWidget):
 
     @property
     def reach(self) -> str:
-        """The range in words: ``1 to 233 months``, ``F to M``."""
-        low, high = map(self.covariate.format, self.covariate.range)
-        return f"{low.removesuffix(self.covariate.unit).strip()} to {high}"
+        """The range in words: ``1 to 233 months``, ``F or M``."""
+        return reach(self.covariate)
 
     @property
     def stops(self) -> list[QWidget]:
@@ -86,7 +85,7 @@ class CovariateRow(QWidget):
         for button in self.buttons:
             button.setChecked(button.level == value)
         self.reset.setEnabled(value != self._home)
-        self.reading.setText(self.covariate.format(round(value, 2)))
+        self.reading.setText(reading(self.covariate, value))
 
     def forget_move(self) -> None:
         """Say no more of a movement that has not come to rest."""

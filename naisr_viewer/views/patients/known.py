@@ -18,7 +18,7 @@ from naisr_viewer.words.titles import as_tip, label
 
 FIT_TIP = "Find the shape of the atlas that comes closest to the scan"
 
-ADVICE = "Tick what is known; the rest is inferred from the shape."
+ADVICE = "Tick what is known; the rest is inferred from the scan."
 NOTHING_TO_KNOW = "The shapes of this atlas depend on no covariates; there is nothing to be known."
 
 
