@@ -138,6 +138,13 @@ class Canvas(QtInteractor):
             plot.is_stale = True
         self.update()
 
+    def devicePixelRatioF(self) -> float:
+        """Pixels of the screen per pixel of Qt, a trace more than that.
+
+        Qt rounds half a pixel up, Python to the even one: without the trace VTK would leave a line undrawn.
+        """
+        return super().devicePixelRatioF() + 1e-9
+
     def initializeGL(self) -> None:
         """Start with a new frame buffer."""
         super().initializeGL()
