@@ -45,7 +45,7 @@ class ErrorBar(QFrame):
         self.dismiss = QPushButton("Dismiss", self)
         self.dismiss.clicked.connect(lambda: self.show_message(""))
         row = QHBoxLayout(self)
-        row.setContentsMargins(14, 8, 10, 8)
+        row.setContentsMargins(8, 8, 8, 8)
         row.addWidget(self.text, 1)
         row.addWidget(self.dismiss, 0, Qt.AlignmentFlag.AlignTop)
         self.hide()

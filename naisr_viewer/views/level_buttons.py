@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from PySide6.QtCore import QSize
 from PySide6.QtWidgets import QPushButton, QWidget
 
 from naisr_model.covariates import Covariate
 from naisr_viewer.views.elided import shortened
 from naisr_viewer.words.titles import as_entry, as_tip
 
+LEAST_PX = 38
 WIDEST_PX = 40
 """Longer names of levels are shortened."""
 
@@ -22,8 +24,12 @@ class LevelButton(QPushButton):
         self.setText(as_entry(shortened(level, self.fontMetrics(), WIDEST_PX)))
         self.setToolTip(as_tip(level))
         self.setCheckable(True)
-        self.setMinimumWidth(38)
         self.setStyleSheet("padding: 3px 6px;")
+
+    def minimumSizeHint(self) -> QSize:
+        """Room for its text, and enough to be hit."""
+        hint = super().minimumSizeHint()
+        return QSize(max(hint.width(), LEAST_PX), hint.height())
 
 
 def level_buttons(covariate: Covariate, parent: QWidget) -> list[LevelButton]:

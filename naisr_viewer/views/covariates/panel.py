@@ -15,7 +15,7 @@ from naisr_viewer.views.theme import Theme
 from naisr_viewer.words.titles import label
 
 PANEL_WIDTH = 320
-LEAST_WIDTH = 240
+LEAST_WIDTH = 248
 
 FOLLOW_HINT = (
     "Moving one covariate takes the other continuous ones along the population's growth path,\n"
@@ -109,7 +109,7 @@ class CovariatePanel(QFrame):
     def _compose(self) -> None:
         inside = QWidget(self)
         column = QVBoxLayout(inside)
-        column.setContentsMargins(18, 16, 18, 16)
+        column.setContentsMargins(14, 16, 14, 16)
         column.setSpacing(4)
         column.addWidget(self.title)
         column.addWidget(self.subtitle)

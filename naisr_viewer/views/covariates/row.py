@@ -106,7 +106,7 @@ class CovariateRow(QWidget):
         name.setObjectName("covariate")
         unit = unit_label(self.covariate.unit, self)
         head = QHBoxLayout()
-        head.setSpacing(6)
+        head.setSpacing(4)
         head.addWidget(name, 1)
         for widget in (self.reading, self.box, unit, self.reset):
             if widget is not None:

@@ -20,8 +20,8 @@ from naisr_viewer.views.patients.result import ComparePart, result_part
 from naisr_viewer.views.patients.scan import AlignmentPart, ScanPart
 
 PANEL_WIDTH = 300
-LEAST_WIDTH = 240
-MARGIN_PX = 18
+LEAST_WIDTH = 248
+MARGIN_PX = 14
 INVITATION = "Open a scan to fit the atlas to it: a mesh, a label volume or a cloud of points."
 
 

@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
     QLabel,
     QLineEdit,
     QListWidget,
+    QPushButton,
     QScrollArea,
     QSlider,
     QToolBar,
@@ -143,6 +144,10 @@ def test_everything_can_be_reached(window, state, size):
     lost = {told(each): out_of_reach(each, window) for each in visible(window, *CONTROLS, QLabel)}
     assert {name: why for name, why in lost.items() if why} == {}
     assert [told(each) for each in visible(window, QLabel) if cut_off(each)] == []
+    buttons = visible(window, QPushButton)
+    assert [told(each) for each in buttons if each.width() < each.minimumSizeHint().width()] == []
+    names = [row.findChild(ElidedLabel, "covariate") for row in window.covariates.rows.values()]
+    assert all(name is not None and name.width() >= 24 for name in names)
 
 
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
@@ -193,6 +198,22 @@ def seen(window: QWidget, widget: QWidget) -> np.ndarray:
 def contrast(window: QWidget, widget: QWidget) -> int:
     grey = seen(window, widget)
     return int(grey.max() - grey.min())
+
+
+@pytest.mark.parametrize("theme", [ThemeChoice.LIGHT, ThemeChoice.DARK])
+@pytest.mark.parametrize("is_ticked", [True, False])
+def test_a_tick_box_has_a_frame(window, state, theme, is_ticked):
+    """Told from the ground on all four sides of the box."""
+    window.show_theme(theme)
+    window.show_state(replace(state, follow=is_ticked))
+    settle()
+    box = window.covariates.follow
+    assert box.isChecked() is is_ticked
+    grey = seen(window, box)
+    ground = grey[0, 0]
+    rows = np.flatnonzero((np.abs(grey[:, :24] - ground) > 35).sum(axis=1) >= 8)
+    columns = np.flatnonzero((np.abs(grey[:, :24] - ground) > 35).sum(axis=0) >= 8)
+    assert rows[-1] - rows[0] >= 10 and columns[-1] - columns[0] >= 10
 
 
 def stops(window: QWidget, first: QWidget) -> list[QWidget]:
