@@ -17,6 +17,9 @@ from naisr_viewer.views.theme import Theme
 from naisr_viewer.words.numbers import mean_reading, reach, reading
 from naisr_viewer.words.titles import as_tip, label
 
+NAME_PX = 32
+"""A name is never narrower; the unit gives way."""
+
 READING_PX = 150
 """A level in words is never wider."""
 
@@ -104,6 +107,7 @@ class CovariateRow(QWidget):
         stripe.setStyleSheet(f"background: {self._colour}; border-radius: 2px;")
         name = ElidedLabel(label(self.covariate.name), self)
         name.setObjectName("covariate")
+        name.setMinimumWidth(NAME_PX)
         unit = unit_label(self.covariate.unit, self)
         head = QHBoxLayout()
         head.setSpacing(4)
