@@ -99,6 +99,5 @@ def in_words(error: BaseException) -> str:
     if isinstance(error, InputError):
         text = capitalised(str(error))
         return text if text.endswith(".") else f"{text}."
-    return (
-        f"Something unexpected went wrong ({type(error).__name__}: {error}). What is on screen is unchanged."
-    )
+    told = f"{type(error).__name__}: {error}".removesuffix(": ")
+    return f"Something unexpected went wrong ({told}). What is on screen is unchanged."
