@@ -24,7 +24,14 @@ from torch import Tensor
 
 from naisr_model.capabilities import Capabilities
 from naisr_model.checkpoint import Checkpoint, load
-from naisr_model.covariates import Covariate, Population, Values, complete, normalised_vector
+from naisr_model.covariates import (
+    Covariate,
+    Population,
+    Values,
+    complete,
+    interval_in_words,
+    normalised_vector,
+)
 from naisr_model.errors import InputError
 from naisr_model.frames import Frame
 from naisr_model.learning.fitting.belief import places_of
@@ -584,18 +591,18 @@ class Fit:
         sentences = []
         if self.residual_mm > MISSED_SHARE * self.individual.atlas.frame.scale_mm:
             sentences.append(
-                f"the fitted surface is {self.residual_mm:.2g} mm from the shape on average: "
+                f"the fitted surface is {self.residual_mm:,.1f} mm from the scan on average: "
                 f"check the alignment{' and the known covariates' if self.covariates else ''}"
             )
         for covariate in self.individual.atlas.covariates:
             low, high = self.intervals.get(covariate.name, (0.0, 0.0))
             extent = covariate.range[1] - covariate.range[0]
             if covariate.kind == "binary" and high > low:
-                sentences.append(f"the shape does not tell {covariate.name}: both levels explain it")
+                sentences.append(f"the scan does not tell {covariate.name}: both levels explain it")
             elif high - low > UNTOLD_SHARE * extent:
                 sentences.append(
-                    f"the shape hardly tells {covariate.name}: "
-                    f"anything from {covariate.format(low)} to {covariate.format(high)} explains it"
+                    f"the scan hardly tells {covariate.name}: "
+                    f"anything from {interval_in_words(covariate, low, high)} explains it"
                 )
         return tuple(sentences)
 

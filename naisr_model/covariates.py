@@ -7,7 +7,7 @@ centred number ``c_i`` of the paper, where 0 is the population centre.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal, cast, get_args
@@ -114,20 +114,20 @@ class Covariate:
         return text if text in self.levels else folded[0] if len(folded) == 1 else ""
 
     def format(self, value: float) -> str:
-        """The value as people write it, with its unit: ``120 months``, ``M``, ``between F and M``."""
+        """The value as people write it, with its unit: ``120 months``, ``M``, ``halfway between F and M``."""
         if self.kind == "binary":
             if abs(value) == 1:
                 return self.levels[int(value > 0)]
-            return f"between {self.levels[0]} and {self.levels[1]} ({value:+.2f})"
+            return _in_between(self.levels, value)
         return f"{value:.{PRINTED_DIGITS}g} {self.unit}".rstrip()
 
     @property
     def extent(self) -> str:
-        """The observed range as people write it: ``1 to 232.7 months``, ``F or M``."""
+        """The observed range as people write it: ``1 to 233 months``, ``F or M``; both ends can be given."""
         if self.kind == "binary":
             return " or ".join(self.levels)
-        low, high = self.range
-        return f"{low:.{PRINTED_DIGITS}g} to {self.format(high)}"
+        low, high = (round(end, self.decimals) for end in self.range)
+        return f"{low:.10g} to {high:.10g} {self.unit}".rstrip()
 
     @property
     def expected(self) -> str:
@@ -329,6 +329,32 @@ def _two(levels: tuple[str, ...]) -> tuple[str, str]:
     if len(levels) != 2:
         raise ValueError(f"a covariate has {len(levels)} levels instead of two")
     return levels[0], levels[1]
+
+
+def interval_in_words(
+    covariate: Covariate, low: float, high: float, told: Callable[[Covariate, float], str] = Covariate.format
+) -> str:
+    """``18.2 to 24.9 kg``; of a binary covariate the levels that are possible: ``F or M``.
+
+    Args:
+        covariate: whose values these are.
+        low: its low end, real units.
+        high: its high end.
+        told: one value with its unit in words.
+    """
+    start, end = told(covariate, low), told(covariate, high)
+    if start == end:
+        return end
+    if covariate.kind == "binary":
+        return f"{start} or {end}"
+    return f"{start.removesuffix(covariate.unit).rstrip()} to {end}"
+
+
+def _in_between(levels: tuple[str, str], value: float) -> str:
+    share = round(100 * abs(value))
+    if not share:
+        return f"halfway between {levels[0]} and {levels[1]}"
+    return f"between {levels[0]} and {levels[1]}, {share} % towards {levels[int(value > 0)]}"
 
 
 def require_known(names: Iterable[str], covariates: Iterable[Covariate]) -> None:

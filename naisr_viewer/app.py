@@ -24,6 +24,8 @@ with loading("naisr-viewer"):
 if TYPE_CHECKING:
     from naisr_viewer.state.atlas_card import AtlasCard
 
+USUAL_PIXELS = (1280, 800)
+
 LOADED = time.monotonic()
 """When the program was loaded, where the system does not tell when it was started."""
 
@@ -59,7 +61,7 @@ def view(
     screenshot: Path | None = None,
     demo: Path | None = None,
     measure: Path | None = None,
-    size: str = "1280x800",
+    size: str | None = None,
     device: str = "cpu",
 ) -> int:
     """Open the window on an atlas.
@@ -83,12 +85,13 @@ def view(
         Time the start and a drag of a slider, write the figures to this JSON file and end;
         needs no display.
     size
-        Size of the window in pixels, WIDTHxHEIGHT.
+        Size of the window in pixels, WIDTHxHEIGHT; left out, that of the last time, and 1280x800 of
+        pictures and measurements.
     device
         Where exact surfaces are computed: cpu, cuda or mps.
     """
     path = (atlas or shipped_atlas()).absolute()
-    pixels = parse_size(size)
+    pixels = USUAL_PIXELS if size is None else parse_size(size)
     require_file(path, "an atlas (.safetensors)")
     if label is not None and scan is None:
         raise InputError(f"--label {label} is of a scan; give --scan FILE too")
@@ -105,7 +108,7 @@ def view(
     first = start.First(path, card, parse_settings(card, settings or []) if card else {}, scan, label)
     if screenshot or demo:
         return start.unattended(engine, first, pixels, screenshot, demo)
-    return start.attended(engine, first, pixels)
+    return start.attended(engine, first, None if size is None else pixels)
 
 
 def parse_settings(card: AtlasCard, settings: Sequence[str]) -> dict[str, float]:

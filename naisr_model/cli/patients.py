@@ -175,10 +175,12 @@ def _fitted(patient: Path, loaded: Any, reading: IntakeOptions) -> tuple[Any, An
 
 
 def _tell_fit(fitted: Any, alternatives: Sequence[Mapping[str, Any]]) -> None:
+    from naisr_model.covariates import interval_in_words
+
     covariates = fitted.individual.atlas.covariates
     for covariate in covariates:
         ends = fitted.intervals.get(covariate.name)
-        interval = "" if ends is None else f" ({_interval(covariate, *ends)})"
+        interval = "" if ends is None else f" ({interval_in_words(covariate, *ends)})"
         print(f"{covariate.name}: {covariate.format(fitted.covariates[covariate.name])}{interval}")
     for other in alternatives[1:]:
         share, values = 100 * other["probability"], _row(covariates, other["covariates"])
@@ -188,14 +190,6 @@ def _tell_fit(fitted: Any, alternatives: Sequence[Mapping[str, Any]]) -> None:
     print(f"residual: {fitted.residual_mm:.2f} mm, {fitted.seconds:.1f} s")
     for sentence in fitted.remarks:
         print(sentence)
-
-
-def _interval(covariate: Covariate, low: float, high: float) -> str:
-    """Of a binary covariate the levels that are possible: between them there is nothing."""
-    start, end = covariate.format(low), covariate.format(high)
-    if start == end:
-        return start
-    return f"{start} or {end}" if covariate.kind == "binary" else f"{start} to {end}"
 
 
 def _row(covariates: Iterable[Covariate], values: Values) -> str:

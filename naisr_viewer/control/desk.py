@@ -131,11 +131,10 @@ class PatientDesk(QObject):
         for name, value in known:
             covariate = atlas.covariates[atlas.index(name)]
             if not covariate.contains(value):
-                low, high = covariate.range
                 told = "no number" if math.isnan(value) else covariate.format(value)
                 self._window.show_error(
-                    f"{label(name)} is {told}; the atlas was made from {low:g} to "
-                    f"{covariate.format(high)}. Correct it, or untick it to have it inferred."
+                    f"{label(name)} is {told}; the atlas was made from {covariate.extent}. "
+                    "Correct it, or untick it to have it inferred."
                 )
                 return True
         return False

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtCore import QSettings
+from PySide6.QtCore import QByteArray, QSettings
 
 from naisr_viewer.state.questions import Question
 from naisr_viewer.state.theme import ThemeChoice
 
 RECENT_FILES = 8
 
+GEOMETRY = "geometry"
 THEME, RECENT, ASKS = "theme", "recent", "asks"
 """Names in the user's settings."""
 
@@ -33,6 +34,16 @@ class Preferences:
     def set_theme(self, choice: ThemeChoice) -> None:
         """Have it again in the next run."""
         self._settings.setValue(THEME, choice.value)
+
+    @property
+    def geometry(self) -> QByteArray:
+        """Size and place of the window when it was closed last, as Qt keeps them; empty before that."""
+        stored = self._settings.value(GEOMETRY)
+        return stored if isinstance(stored, QByteArray) else QByteArray()
+
+    def set_geometry(self, geometry: QByteArray) -> None:
+        """Have them again in the next run."""
+        self._settings.setValue(GEOMETRY, geometry)
 
     @property
     def recent(self) -> list[Path]:

@@ -7,25 +7,30 @@ from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Layout
 from naisr_viewer.state.requests import SurfaceResult
 from naisr_viewer.words.captions import Caption, beyond, large
-from naisr_viewer.words.numbers import volume
+from naisr_viewer.words.numbers import length, volume
 
 HINT = (
     "Distance of the scan to the full shape along its normal, in mm, to first order: "
-    "positive where the scan lies outside the shape."
+    "positive where the scan lies outside the shape. The residual is its mean without the sign, over points "
+    "of the whole scan that the fit has not seen."
 )
 
 
 def _caption(state: ExplorerState, result: SurfaceResult) -> Caption:
     scan = state.shown.scan if state.shown else None
     own = "open surface" if scan is None or scan.volume_cm3 is None else volume(scan.volume_cm3)
-    return Caption(large(own) + _mean_distance(result), HINT)
+    return Caption(large(own) + _away(state, result), HINT)
 
 
-def _mean_distance(result: SurfaceResult) -> str:
+def _away(state: ExplorerState, result: SurfaceResult) -> str:
+    """The residual of the fit; at other covariates, where it no longer counts, the mean of the colours."""
     if result.colouring is None:
         return ""
-    mean_mm = np.abs(result.colouring.values).mean()
-    return f"<br>mean distance {mean_mm:.2f} mm{beyond(result.colouring)}"
+    if state.fit is not None and result.request.values == state.fit.values:
+        told = f"residual {length(state.fit.residual_mm)}"
+    else:
+        told = f"{length(float(np.abs(result.colouring.values).mean()))} from this shape on average"
+    return f"<br>{told}{beyond(result.colouring)}"
 
 
 KIND = PanelKind(

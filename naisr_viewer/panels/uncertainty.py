@@ -5,6 +5,7 @@ from naisr_viewer.panels.base import PanelKind, ask_full_shape, caption_of
 from naisr_viewer.state.layouts import Layout
 from naisr_viewer.state.requests import SurfaceResult
 from naisr_viewer.words.captions import Caption, beyond, large
+from naisr_viewer.words.numbers import length
 
 HINT = (
     "Half of the 95 % interval of the surface's place along its normal, in mm, for someone known by one "
@@ -17,7 +18,7 @@ def _mean_margin(result: SurfaceResult) -> Caption:
         return Caption(large("…"), HINT)
     mean_mm = result.colouring.values.mean()
     told = f"<br>mean 95 % margin{beyond(result.colouring)}"
-    return Caption(large(f"± {mean_mm:.2f} mm") + told, HINT)
+    return Caption(large(f"± {length(float(mean_mm))}") + told, HINT)
 
 
 KIND = PanelKind(

@@ -31,6 +31,9 @@ if TYPE_CHECKING:
     from naisr_viewer.state.patients import Reading
     from naisr_viewer.views.main_window import MainWindow
 
+SETTINGS = ("naisr", "naisr-viewer")
+"""Under whose name the user's settings are kept."""
+
 MOST_LISTED = 8
 """Labels in a message."""
 
@@ -104,7 +107,7 @@ def make_window(
     from naisr_viewer.views.main_window import MainWindow
 
     if settings_file is None:
-        settings = QSettings("naisr", "naisr-viewer")
+        settings = QSettings(*SETTINGS)
     else:
         settings = QSettings(str(settings_file), QSettings.Format.IniFormat)
     window = MainWindow()
@@ -135,9 +138,12 @@ def make_application() -> QApplication:
     return app
 
 
-def attended(engine: Engine, first: First, pixels: tuple[int, int]) -> int:
-    """The window in the hands of a person, until it is closed."""
-    from PySide6.QtCore import Qt
+def attended(engine: Engine, first: First, pixels: tuple[int, int] | None) -> int:
+    """The window in the hands of a person, until it is closed; without ``pixels`` as large as it was last."""
+    from PySide6.QtCore import QSettings, Qt
+
+    from naisr_viewer.control.preferences import Preferences
+    from naisr_viewer.program.placing import place
 
     require_display()
     app = make_application()
@@ -148,12 +154,13 @@ def attended(engine: Engine, first: First, pixels: tuple[int, int]) -> int:
     if (reading := first.reading) is not None:
         once = Qt.ConnectionType.SingleShotConnection
         controller.refinement.settled.connect(lambda: window.reading_requested.emit(reading), once)
+    place(window, pixels, Preferences(QSettings(*SETTINGS)))
     with ending_at_once():
-        show(window, controller, first, pixels)
+        show(window, controller, first)
         return app.exec()
 
 
-def show(window: MainWindow, controller: Controller, first: First, pixels: tuple[int, int]) -> None:
+def show(window: MainWindow, controller: Controller, first: First) -> None:
     """Put the window on the screen first; what takes long starts behind it."""
 
     def begin() -> None:
@@ -164,7 +171,6 @@ def show(window: MainWindow, controller: Controller, first: First, pixels: tuple
             controller.show_atlas(first.card, first.values)
 
     sys.excepthook = controller.report
-    window.resize(*pixels)
     window.show_opening(first.path.name)
     window.appeared.connect(begin)
     window.show()
@@ -187,7 +193,8 @@ def measured(engine: Engine, path: Path, pixels: tuple[int, int], file: Path, lo
         from naisr_viewer.program.measure import Observer, measure, process_start
 
         observer = Observer(window, controller)
-        show(window, controller, First(path), pixels)
+        window.resize(*pixels)
+        show(window, controller, First(path))
         measure(window, controller, engine, observer, process_start(loaded) + display_s, file)
     print(f"wrote {file}")
     return 0

@@ -18,6 +18,7 @@ from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Layout
 from naisr_viewer.state.theme import ThemeChoice
 from naisr_viewer.views.covariates.panel import CovariatePanel
+from naisr_viewer.views.more_button import show_more_sign
 from naisr_viewer.views.shapes.camera import DIRECTIONS
 from naisr_viewer.views.shapes.shape_view import ShapeView
 
@@ -227,7 +228,7 @@ COMMANDS = (
         "Reset camera",
         lambda window: window.shapes.reset_camera(),
         keys=("Ctrl+0",),
-        tip="Frame the shapes",
+        tip="The view that an atlas opens with",
         needs=OPEN,
     ),
     *LOOKS,
@@ -308,6 +309,7 @@ def make_toolbar(actions: Mapping[str, QAction], parent: QWidget) -> QToolBar:
     bar.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextOnly)
     bar.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
     fill(bar, TOOLBAR, actions)
+    show_more_sign(bar)
     return bar
 
 

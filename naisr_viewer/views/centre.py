@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtCore import QSize
+from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 
 from naisr_viewer.views.changed_bar import ChangedBar
 from naisr_viewer.views.empty_page import EmptyPage
 from naisr_viewer.views.error_bar import ErrorBar
+
+FULL_WIDTH_PX = 540
+"""A narrower window takes from the panels as well as from the shapes."""
 
 
 class Centre(QWidget):
@@ -22,16 +26,27 @@ class Centre(QWidget):
         self.errors = ErrorBar(self)
         self.changed = ChangedBar(self)
         self.empty = EmptyPage(self)
-        self._pages = QStackedWidget(self)
-        self._pages.addWidget(self.empty)
-        self._pages.addWidget(shapes)
+        self._shapes = shapes
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
         column.addWidget(self.errors)
         column.addWidget(self.changed)
-        column.addWidget(self._pages, 1)
+        column.addWidget(self.empty, 1)
+        column.addWidget(shapes, 1)
+        self.show_shapes(False)
+
+    def sizeHint(self) -> QSize:
+        """The width from which on the panels beside it have theirs."""
+        return QSize(FULL_WIDTH_PX, super().sizeHint().height())
+
+    @property
+    def stops(self) -> list[QWidget]:
+        """What the Tab key goes through, as it is read."""
+        return [*self.errors.stops, *self.changed.stops, self.empty.button]
 
     def show_shapes(self, is_open: bool) -> None:
         """Show the shapes where an atlas is open, else the empty page."""
-        self._pages.setCurrentIndex(1 if is_open else 0)
+        self.empty.setVisible(not is_open)
+        self._shapes.setVisible(is_open)

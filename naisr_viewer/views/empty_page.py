@@ -5,6 +5,10 @@ from __future__ import annotations
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QFrame, QLabel, QPushButton, QVBoxLayout, QWidget
 
+from naisr_viewer.views.elided import ElidedLabel
+
+ZONE_PX = 420
+
 
 class EmptyPage(QFrame):
     """Invites to open an atlas, or says that one is being opened."""
@@ -14,22 +18,27 @@ class EmptyPage(QFrame):
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
         self.setObjectName("canvasArea")
-        self._invitation = QLabel(self)
+        self._invitation = ElidedLabel("", self)
+        self._invitation.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._invitation.setObjectName("emptyTitle")
         hint = QLabel("a .safetensors file made by “naisr train”, or", self)
         hint.setObjectName("muted")
-        button = QPushButton("Open atlas…", self)
-        button.clicked.connect(self.open_requested)
+        self.button = QPushButton("Open atlas…", self)
+        self.button.clicked.connect(self.open_requested)
         zone = QFrame(self)
         zone.setObjectName("dropZone")
+        zone.setMinimumWidth(ZONE_PX)
         column = QVBoxLayout(zone)
-        column.setContentsMargins(70, 54, 70, 54)
+        column.setContentsMargins(40, 40, 40, 40)
         column.setSpacing(12)
-        self._invited = (hint, button)
-        for widget in (self._invitation, *self._invited):
+        self._invited = (hint, self.button)
+        column.addWidget(self._invitation)
+        for widget in self._invited:
             column.addWidget(widget, 0, Qt.AlignmentFlag.AlignHCenter)
         outer = QVBoxLayout(self)
-        outer.addWidget(zone, 0, Qt.AlignmentFlag.AlignCenter)
+        outer.addStretch(1)
+        outer.addWidget(zone, 0, Qt.AlignmentFlag.AlignHCenter)
+        outer.addStretch(1)
         self.show_opening("")
 
     def show_opening(self, name: str) -> None:

@@ -31,10 +31,19 @@ from naisr_viewer.views.covariates.panel import CovariatePanel
 from naisr_viewer.views.dialogs.about import about
 from naisr_viewer.views.dialogs.documents import DocumentWindow
 from naisr_viewer.views.dialogs.export import ExportDialog
-from naisr_viewer.views.dialogs.files import ask_image_path, ask_open_path, ask_scan_path, dropped, is_atlas
+from naisr_viewer.views.dialogs.files import (
+    ask_image_path,
+    ask_open_path,
+    ask_scan_path,
+    dropped,
+    is_atlas,
+    is_scan,
+)
+from naisr_viewer.views.dialogs.instead import ask_instead
 from naisr_viewer.views.dialogs.label import ask_label
 from naisr_viewer.views.dialogs.preferences import ask_preferences
 from naisr_viewer.views.dialogs.question import ask
+from naisr_viewer.views.focus import FocusRest, in_order
 from naisr_viewer.views.patients.panel import PatientPanel
 from naisr_viewer.views.recent_menu import RecentMenu
 from naisr_viewer.views.shapes.shape_view import ShapeView
@@ -79,6 +88,7 @@ class MainWindow(QMainWindow):
         self._theme_choice = ThemeChoice.SYSTEM
         self._has_appeared = False
         self._documents: DocumentWindow | None = None
+        self._focus = FocusRest(self)
         self._is_editable, self._can_undo, self._can_redo = True, False, False
         self.covariates = CovariatePanel(self)
         self.shapes = ShapeView(self)
@@ -105,6 +115,7 @@ class MainWindow(QMainWindow):
             self.shapes.show_atlas(state.atlas, theme)
             self.setWindowTitle(f"{state.atlas.name} — {TITLE}")
             offer(COMMANDS, self._actions, state.atlas)
+            in_order(self._stops)
         self._centre.show_shapes(state.atlas is not None)
         if state.is_atlas_changed != old.is_atlas_changed:  # what was put off stays so
             name = state.atlas.path.name if state.atlas and state.is_atlas_changed else ""
@@ -132,6 +143,12 @@ class MainWindow(QMainWindow):
             self.shapes.show_ghost(None)
         else:
             self.shapes.show_ghost(scan.points_mm, scan.faces)
+
+    @property
+    def _stops(self) -> list[QWidget]:
+        """What the Tab key goes through, as it is read: the panels from left to right, then what is below."""
+        centre = [*self._centre.stops, self.shapes.row_bar]
+        return [*self.covariates.stops, *centre, *self.patients.stops, self.cancel]
 
     def show_history(self, can_undo: bool, can_redo: bool) -> None:
         """Enable what can be undone and redone."""
@@ -180,10 +197,15 @@ class MainWindow(QMainWindow):
 
     def set_editable(self, editable: bool) -> None:
         """Whether covariates and patients can be changed just now; what would end the work rests, too."""
+        focused = self.focusWidget()
         self.covariates.setEnabled(editable)
         self.patients.set_editable(editable)
         self._is_editable = editable
         self._enable()
+        if editable:
+            self._focus.end()
+        else:
+            self._focus.begin(focused)
 
     def _enable(self) -> None:
         """Enable the commands that make sense."""
@@ -193,7 +215,10 @@ class MainWindow(QMainWindow):
     def ask_atlas(self) -> None:
         """Let an atlas be chosen and opened."""
         path = ask_open_path(self)
-        if path is not None:
+        if path is not None and is_scan(path):
+            if ask_instead(self, path, "scan"):
+                self.scan_requested.emit(path)
+        elif path is not None:
             self.open_requested.emit(path)
 
     def _ask_again(self) -> None:
@@ -204,7 +229,10 @@ class MainWindow(QMainWindow):
     def ask_scan(self) -> None:
         """Let a patient's file be chosen and opened."""
         path = ask_scan_path(self)
-        if path is not None:
+        if path is not None and is_atlas(path):
+            if ask_instead(self, path, "atlas"):
+                self.open_requested.emit(path)
+        elif path is not None:
             self.scan_requested.emit(path)
 
     def ask_export(self) -> None:
@@ -271,7 +299,7 @@ class MainWindow(QMainWindow):
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(0)
         row.addWidget(self.covariates)
-        row.addWidget(self._centre, 1)
+        row.addWidget(self._centre)
         row.addWidget(self.patients)
         self.setCentralWidget(body)
         self.setStatusBar(self._below)

@@ -10,8 +10,8 @@ from PySide6.QtGui import QFocusEvent, QKeyEvent, QWheelEvent
 from PySide6.QtWidgets import QLineEdit, QToolTip, QWidget
 
 from naisr_model.covariates import Covariate
-from naisr_viewer.words.numbers import decimals, written
-from naisr_viewer.words.titles import label
+from naisr_viewer.words.numbers import written
+from naisr_viewer.words.titles import as_tip, label
 
 WIDTH_PX = 76
 NUMBER = re.compile(r"[-+−]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+−]?\d+)?")
@@ -63,14 +63,13 @@ class NumberBox(QLineEdit):
         value = self.value
         if value is None or self.covariate.contains(value):
             return ""
-        low, high = self.covariate.range
         told = "no number" if math.isnan(value) else "outside the data behind the atlas"
-        return f"“{self.text()}” is {told}: {low:g} to {self.covariate.format(high)}"
+        return f"“{self.text()}” is {told}: {self.covariate.extent}"
 
     @property
     def step(self) -> float:
         """What an arrow key adds."""
-        return float(10.0 ** (1 - decimals(self.covariate)))
+        return float(10.0 ** (1 - self.covariate.decimals))
 
     def show_value(self, value: float | None) -> None:
         """Show a value, or nothing, telling nobody; what is being typed over the same value stays."""
@@ -162,8 +161,7 @@ class NumberBox(QLineEdit):
         return "" if value is None else written(self.covariate, value)
 
     def _mark(self) -> None:
-        low, high = self.covariate.range
-        self.setToolTip(self.complaint or f"{low:g} to {self.covariate.format(high)}")
+        self.setToolTip(as_tip(self.complaint or self.covariate.extent))
         self.setProperty("isWrong", bool(self.complaint))
         self.style().unpolish(self)
         self.style().polish(self)

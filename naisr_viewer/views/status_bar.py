@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeySequence
-from PySide6.QtWidgets import QLabel, QProgressBar, QPushButton, QStatusBar, QWidget
+from PySide6.QtWidgets import QProgressBar, QPushButton, QStatusBar, QWidget
 
+from naisr_viewer.views.elided import ElidedLabel
 from naisr_viewer.views.shapes.scale_bar import ScaleBar
 
 STEPS = 1000
@@ -19,8 +20,8 @@ class StatusBar(QStatusBar):
         super().__init__(parent)
         self.setSizeGripEnabled(False)
         self.setMinimumHeight(34)
-        self.text = QLabel(self)
-        self.text.setObjectName("status")
+        self.text = ElidedLabel("", self)
+        self.text.keep_free(12, 0)
         self.progress = QProgressBar(self)
         self.progress.setRange(0, STEPS)
         self.progress.setTextVisible(False)

@@ -30,6 +30,7 @@ def style_sheet(theme: Theme) -> str:
                 border-color: {t.accent}; }}
     QPushButton:default {{ border-color: {t.accent}; }}
     QPushButton:disabled, QToolBar QToolButton:disabled {{ color: {t.muted}; background: {t.window}; }}
+    QToolBar #qt_toolbar_ext_button {{ padding: 4px 0; font-weight: 600; }}
     QToolBar QToolButton:checked:disabled {{ color: {t.muted}; background: {t.line};
                 border-color: {t.line}; }}
     QPushButton:focus {{ border-color: {t.accent}; }}
@@ -42,7 +43,13 @@ def style_sheet(theme: Theme) -> str:
     QStatusBar::item {{ border: none; }}
     QProgressBar {{ background: {t.line}; border: none; border-radius: 3px; max-height: 6px; }}
     QProgressBar::chunk {{ background: {t.accent}; border-radius: 3px; }}
-    QScrollArea, #sidebar, #patientBar {{ background: {t.window}; border: none; }}
+    #sidebar, #patientBar {{ background: {t.window}; border: none; }}
+    QScrollArea {{ background: {t.window}; border: 1px solid transparent; }}
+    QScrollArea:focus {{ border-color: {t.accent}; }}
+    QCheckBox {{ border: 1px solid transparent; border-radius: 3px; }}
+    QCheckBox:focus {{ border-color: {t.accent}; }}
+    QToolButton:focus {{ border: 1px solid {t.accent}; border-radius: 4px; }}
+    QPushButton:checked:focus {{ border: 2px solid {t.text}; }}
     #sidebar {{ border-right: 1px solid {t.line}; }}
     #patientBar {{ border-left: 1px solid {t.line}; }}
     #patientList {{ background: {t.raised}; border: 1px solid {t.line}; border-radius: 5px; padding: 2px;
@@ -51,14 +58,13 @@ def style_sheet(theme: Theme) -> str:
     #patientList::item {{ border-left: 3px solid transparent; border-radius: 3px; }}
     #patientList::item:hover {{ background: {t.window}; }}
     #patientList::item:selected {{ background: {t.line}; border-left-color: {t.accent}; color: {t.text}; }}
-    #sidebar QScrollBar:vertical, #patientBar QScrollBar:vertical {{ background: transparent; width: 10px;
-                margin: 0; }}
-    #sidebar QScrollBar::handle:vertical, #patientBar QScrollBar::handle:vertical {{ background: {t.line};
-                border-radius: 3px; margin: 2px; min-height: 32px; }}
-    #sidebar QScrollBar::handle:vertical:hover, #patientBar QScrollBar::handle:vertical:hover {{
-                background: {t.muted}; }}
-    #sidebar QScrollBar::add-line, #sidebar QScrollBar::sub-line,
-    #patientBar QScrollBar::add-line, #patientBar QScrollBar::sub-line {{ height: 0; }}
+    QScrollBar:vertical {{ background: transparent; width: 10px; margin: 0; }}
+    QScrollBar::handle:vertical {{ background: {t.line}; border-radius: 3px; margin: 2px;
+                min-height: 32px; }}
+    QScrollBar::handle:vertical:hover {{ background: {t.muted}; }}
+    QScrollBar:vertical:focus {{ background: {t.accent}; }}
+    QScrollBar::add-line, QScrollBar::sub-line {{ height: 0; }}
+    QScrollBar::add-page, QScrollBar::sub-page {{ background: transparent; }}
     #patientBar QComboBox {{ background: {t.raised}; border: 1px solid {t.line}; border-radius: 5px;
                 padding: 3px 8px; color: {t.text}; }}
     #patientBar QComboBox:hover, #patientBar QComboBox:focus {{ border-color: {t.accent}; }}
@@ -83,14 +89,14 @@ def style_sheet(theme: Theme) -> str:
     #title {{ font-size: 15pt; font-weight: 600; }}
     #covariate {{ font-weight: 600; }}
     #muted {{ color: {t.muted}; }}
-    #panelTitle {{ font-weight: 600; color: {t.text}; background: {t.canvas}; padding-left: 10px; }}
-    #caption {{ color: {t.text}; background: {t.canvas}; }}
-    #status {{ padding-left: 12px; }}
+    #panelTitle {{ font-weight: 600; color: {t.text}; }}
+    #caption {{ color: {t.text}; }}
     #separator {{ background: {t.line}; }}
     #canvasArea {{ background: {t.canvas}; }}
     #dropZone {{ border: 2px dashed {t.line}; border-radius: 14px; }}
     #emptyTitle {{ font-size: 18pt; font-weight: 600; }}
     #errorBar {{ background: {t.error}; }}
-    #errorBar QLabel {{ color: {t.on_error}; }}
+    #errorBar QTextEdit {{ background: transparent; color: {t.on_error}; border: 1px solid transparent; }}
+    #errorBar QTextEdit:focus, #errorBar QPushButton:focus {{ border: 2px solid {t.on_error}; }}
     #errorBar QPushButton {{ background: transparent; color: {t.on_error}; border-color: {t.on_error}; }}
     """

@@ -4,16 +4,11 @@ from __future__ import annotations
 
 import math
 
-from naisr_model.covariates import Covariate
+from naisr_model.covariates import Covariate, interval_in_words
 from naisr_model.errors import InputError
 
 TYPED_DIGITS = 7
 """Numbers that end within so many digits, counted from the last usual one, are shown as they are."""
-
-
-def decimals(covariate: Covariate) -> int:
-    """Digits after the point that a number box has; the range counts as far as they tell it."""
-    return covariate.decimals
 
 
 def written(covariate: Covariate, value: float) -> str:
@@ -21,7 +16,7 @@ def written(covariate: Covariate, value: float) -> str:
 
     What has more digits than anybody types, such as an inferred value, is rounded.
     """
-    usual = decimals(covariate)
+    usual = covariate.decimals
     exact = (digits for digits in range(usual, usual + TYPED_DIGITS) if round(value, digits) == value)
     return f"{value:.{next(exact, usual)}f}"
 
@@ -30,7 +25,7 @@ def reading(covariate: Covariate, value: float) -> str:
     """The value with its unit and as many digits as its range asks for: ``84 months``, ``M``."""
     if covariate.kind == "binary":
         return covariate.format(round(value, 2))
-    return f"{value:.{decimals(covariate)}f} {covariate.unit}".rstrip()
+    return f"{value:.{covariate.decimals}f} {covariate.unit}".rstrip()
 
 
 def given(covariate: Covariate, value: float) -> str:
@@ -40,14 +35,32 @@ def given(covariate: Covariate, value: float) -> str:
     return f"{written(covariate, value)} {covariate.unit}".rstrip()
 
 
+def interval_reading(covariate: Covariate, low: float, high: float) -> str:
+    """A 95 % interval: ``95 %: 18.2 to 24.9 kg``; of a binary covariate the levels it leaves open."""
+    told = interval_in_words(covariate, low, high, reading)
+    if covariate.kind == "binary":
+        return "inferred" if low == high else f"inferred; {told}"
+    return f"95 %: {told}"
+
+
+def length(mm: float) -> str:
+    """A distance with digits that mean something: ``0.08 mm``, ``13.5 mm``, ``2,314 mm``."""
+    digits = 2 if abs(mm) < 9.995 else 1 if abs(mm) < 99.95 else 0
+    return f"{mm:,.{digits}f} mm"
+
+
+def duration(seconds: float) -> str:
+    """``0.49 s``, ``4.2 s``, ``132 s``."""
+    digits = 2 if seconds < 0.995 else 1 if seconds < 9.95 else 0
+    return f"{seconds:,.{digits}f} s"
+
+
 def patient_reading(covariate: Covariate, value: float, interval: tuple[float, float] | None) -> str:
-    """The patient's value in words: ``patient 21.3 kg, 95 %: 18.2 to 24.9``."""
+    """The patient's value in words: ``patient 21.3 kg, 95 %: 18.2 to 24.9 kg``."""
     text = f"patient {reading(covariate, value)}"
     if interval is None:
         return text
-    digits = 2 if covariate.kind == "binary" else decimals(covariate)
-    low, high = (f"{end:.{digits}f}".replace("-", "−") for end in interval)
-    return f"{text}, 95 %: {low} to {high}"
+    return f"{text}, {interval_reading(covariate, *interval)}"
 
 
 def mean_reading(covariate: Covariate) -> str:
@@ -86,6 +99,5 @@ def in_words(error: BaseException) -> str:
     if isinstance(error, InputError):
         text = capitalised(str(error))
         return text if text.endswith(".") else f"{text}."
-    return (
-        f"Something unexpected went wrong ({type(error).__name__}: {error}). What is on screen is unchanged."
-    )
+    told = f"{type(error).__name__}: {error}".removesuffix(": ")
+    return f"Something unexpected went wrong ({told}). What is on screen is unchanged."

@@ -6,11 +6,13 @@ from collections.abc import Sequence
 
 from naisr_model.covariates import Covariate
 from naisr_viewer.state.patients import Fitted, Method, Scan
-from naisr_viewer.words.numbers import capitalised, given, reading, volume
+from naisr_viewer.words.numbers import capitalised, duration, given, interval_reading, length, reading, volume
 from naisr_viewer.words.titles import label
 
-LONGEST_WORD = 28
-"""Letters that surely fit into a line; longer names are broken anywhere."""
+LONGEST_WORD, LONGEST_IN_TABLE = 28, 14
+"""Letters that surely fit into a line, and into half of one; longer names are broken anywhere."""
+
+RESIDUAL = "mean distance, scan to fitted shape"
 
 METHODS: tuple[tuple[Method, str], ...] = (
     ("none", "as in the file"),
@@ -39,14 +41,6 @@ def measured(scan: Scan) -> str:
     return "open surface, no volume" if len(scan.faces) else "cloud of points, no volume"
 
 
-def interval(covariate: Covariate, low: float, high: float) -> str:
-    """A 95 % interval: ``95 %: 18.2 to 24.9 kg``; of a binary covariate the levels it leaves open."""
-    start, end = reading(covariate, low), reading(covariate, high)
-    if covariate.kind == "binary":
-        return "inferred" if low == high else f"inferred; {start} or {end}"
-    return f"95 %: {start.removesuffix(covariate.unit).strip()} to {end}"
-
-
 def findings(fit: Fitted, covariates: Sequence[Covariate]) -> list[tuple[str, str, str]]:
     """The rows of the result: what, its value with unit, and how sure or what it means."""
     values = dict(fit.values)
@@ -55,7 +49,7 @@ def findings(fit: Fitted, covariates: Sequence[Covariate]) -> list[tuple[str, st
     for each in covariates:
         value = values[each.name]
         if each.name in sure:
-            told = reading(each, value), interval(each, *sure[each.name])
+            told = reading(each, value), interval_reading(each, *sure[each.name])
         else:
             told = given(each, value), "known"
         rows.append((label(each.name), *told))
@@ -65,9 +59,9 @@ def findings(fit: Fitted, covariates: Sequence[Covariate]) -> list[tuple[str, st
     return [
         *rows,
         ("Volume", f"{volume(fit.volume_cm3, fit.volume_margin_cm3)} (95 %)", ""),
-        ("Residual", f"{fit.residual_mm:.2f} mm", "mean distance, scan to fitted surface"),
+        ("Residual", length(fit.residual_mm), RESIDUAL),
         *lasting,
-        ("Time", f"{fit.seconds:.1f} s", ""),
+        ("Time", duration(fit.seconds), ""),
     ]
 
 
@@ -76,6 +70,6 @@ def sentence(text: str) -> str:
     return breakable(capitalised(text))
 
 
-def breakable(text: str) -> str:
-    """``text`` with words that can be broken anywhere, where they would not fit into a line."""
-    return " ".join("\u200b".join(word) if len(word) > LONGEST_WORD else word for word in text.split(" "))
+def breakable(text: str, longest: int = LONGEST_WORD) -> str:
+    """``text`` with words of more letters than the ``longest`` that can be broken anywhere."""
+    return " ".join("\u200b".join(word) if len(word) > longest else word for word in text.split(" "))

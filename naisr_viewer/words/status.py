@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from naisr_viewer.state.requests import EXACT_RESOLUTION, Origin, SurfaceResult
+from naisr_viewer.words.numbers import duration, length
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,6 @@ def _in_short(results: Sequence[SurfaceResult]) -> str:
     if results[0].origin is Origin.TABLES:
         return f"Preview in {1000 * seconds:.0f} ms"
     size = results[0].request.resolution
-    text = f"{'Exact' if results[0].is_exact else 'Preview'} {size}³ in {seconds:.2g} s"
+    text = f"{'Exact' if results[0].is_exact else 'Preview'} {size}³ in {duration(seconds)}"
     errors = [result.preview_error_mm for result in results if result.preview_error_mm is not None]
-    return f"{text} · 99 % of the preview was within {max(0.01, *errors):.2f} mm" if errors else text
+    return f"{text} · 99 % of the preview was within {length(max(0.01, *errors))}" if errors else text

@@ -266,7 +266,7 @@ def test_the_second_start_paints_the_first_picture_before_the_networks_are_impor
         application, pictures = start.make_application(), []
         window, controller = start.make_window(opened, Path({str(tmp_path / "settings.ini")!r}))
         window.shapes.drawn.connect(note)
-        start.show(window, controller, start.First(Path({str(egg_atlas)!r})), (800, 600))
+        start.show(window, controller, start.First(Path({str(egg_atlas)!r})))
         headless.wait_until(lambda: bool(pictures), 60)
         headless.wait_until(lambda: opened.has_previews(controller.state.atlas.path), 60)
         window.close()

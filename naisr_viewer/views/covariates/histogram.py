@@ -12,6 +12,7 @@ from naisr_model.covariates import Covariate
 from naisr_viewer.views.covariates.slider import HANDLE_PX, track_x
 from naisr_viewer.views.theme import Theme
 from naisr_viewer.words.numbers import mean_reading, patient_reading
+from naisr_viewer.words.titles import as_tip
 
 BINS = 28
 
@@ -107,13 +108,11 @@ class Histogram(QWidget):
         marks = [f"Tick: population mean {mean_reading(covariate)}"]
         if self._patient is not None:
             marks.append(f"Triangle: {patient_reading(covariate, self._patient, self._interval)}")
-        self.setToolTip("\n".join([f"Bars: {self._bars_reading()}", *marks]))
+        self.setToolTip(as_tip("\n".join([f"Bars: {self._bars_reading()}", *marks])))
 
     def _bars_reading(self) -> str:
         """Whom the bars count, in words."""
         if self._covariate.kind == "binary":
             levels = zip(self._counts, self._covariate.levels, strict=True)
             return " · ".join(f"{int(count)} {name}" for count, name in levels)
-        low, high = self._covariate.range
-        where = f"between {low:g} and {high:g} {self._covariate.unit}".rstrip()
-        return f"{int(self._counts.sum())} shapes behind the atlas {where}"
+        return f"{int(self._counts.sum())} shapes behind the atlas, {self._covariate.extent}"

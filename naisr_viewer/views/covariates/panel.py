@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QSignalBlocker, Qt, Signal
-from PySide6.QtWidgets import QCheckBox, QFrame, QLabel, QPushButton, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtCore import QSignalBlocker, QSize, Qt, Signal
+from PySide6.QtWidgets import QFrame, QLabel, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.views.colours import covariate_colour
 from naisr_viewer.views.covariates.row import CovariateRow
+from naisr_viewer.views.elided import ElidedCheckBox, ElidedLabel
+from naisr_viewer.views.focus import in_order
 from naisr_viewer.views.theme import Theme
 from naisr_viewer.words.titles import label
 
 PANEL_WIDTH = 320
+LEAST_WIDTH = 248
 
 FOLLOW_HINT = (
     "Moving one covariate takes the other continuous ones along the population's growth path,\n"
@@ -32,18 +35,19 @@ class CovariatePanel(QFrame):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("sidebar")
-        self.setFixedWidth(PANEL_WIDTH)
+        self.setMinimumWidth(LEAST_WIDTH)
+        self.setMaximumWidth(PANEL_WIDTH)
         self.rows: dict[str, CovariateRow] = {}
-        self.title = QLabel(self)
+        self.title = ElidedLabel("", self)
         self.title.setObjectName("title")
         self.subtitle = QLabel(self)
         self.subtitle.setObjectName("muted")
         self.subtitle.setWordWrap(True)
-        self.follow = QCheckBox("Others follow as in the population", self)
-        self.follow.setToolTip(FOLLOW_HINT)
+        self.follow = ElidedCheckBox("Others follow as in the population", FOLLOW_HINT, self)
         self.follow.toggled.connect(self.follow_toggled)
         self.reset_all = QPushButton(self)
         self.reset_all.clicked.connect(self.reset_all_requested)
+        self._area = QScrollArea(self)
         self._rows_area = QVBoxLayout()
         self._rows_area.setSpacing(22)
         self._compose()
@@ -67,7 +71,18 @@ class CovariatePanel(QFrame):
         self.subtitle.setText(_origin(atlas))
         self.follow.setVisible(sum(covariate.kind == "continuous" for covariate in atlas.covariates) > 1)
         self.reset_all.setVisible(bool(atlas.covariates))
+        in_order(self.stops)
         self.set_theme(theme)
+
+    def sizeHint(self) -> QSize:
+        """As wide as it may be; a narrow window gives it less."""
+        return QSize(PANEL_WIDTH, super().sizeHint().height())
+
+    @property
+    def stops(self) -> list[QWidget]:
+        """What the Tab key goes through, as it is read."""
+        rows = [stop for row in self.rows.values() for stop in row.stops]
+        return [self._area, *rows, self.follow, self.reset_all]
 
     def show_values(self, state: ExplorerState) -> None:
         """Put every row at its value, and say where home is: the patient's values or the population mean."""
@@ -95,7 +110,7 @@ class CovariatePanel(QFrame):
     def _compose(self) -> None:
         inside = QWidget(self)
         column = QVBoxLayout(inside)
-        column.setContentsMargins(18, 16, 18, 16)
+        column.setContentsMargins(14, 16, 14, 16)
         column.setSpacing(4)
         column.addWidget(self.title)
         column.addWidget(self.subtitle)
@@ -108,13 +123,12 @@ class CovariatePanel(QFrame):
         column.addStretch(1)
         self.follow.setVisible(False)
         self.reset_all.setVisible(False)
-        area = QScrollArea(self)
-        area.setWidget(inside)
-        area.setWidgetResizable(True)
-        area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self._area.setWidget(inside)
+        self._area.setWidgetResizable(True)
+        self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         outer = QVBoxLayout(self)
         outer.setContentsMargins(0, 0, 1, 0)
-        outer.addWidget(area)
+        outer.addWidget(self._area)
 
 
 def _origin(atlas: AtlasCard) -> str:

@@ -5,16 +5,23 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QSignalBlocker, QTimer, Signal
-from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QLabel, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QToolButton, QVBoxLayout, QWidget
 
 from naisr_model.covariates import Covariate
 from naisr_viewer.views.covariates.histogram import Histogram
 from naisr_viewer.views.covariates.slider import JumpSlider, chosen_value, slider_position
+from naisr_viewer.views.elided import ElidedLabel, unit_label
 from naisr_viewer.views.level_buttons import LevelButton, level_buttons
 from naisr_viewer.views.number_box import NumberBox
 from naisr_viewer.views.theme import Theme
 from naisr_viewer.words.numbers import mean_reading, reading
-from naisr_viewer.words.titles import label
+from naisr_viewer.words.titles import as_tip, label
+
+NAME_PX = 32
+"""A name is never narrower; the unit gives way."""
+
+READING_PX = 150
+"""A level in words is never wider."""
 
 SETTLE_MS = 400
 """Keys and wheel count as one movement until they pause this long."""
@@ -39,8 +46,8 @@ class CovariateRow(QWidget):
         self.reset = _reset_button(covariate, self)
         self.box = NumberBox(covariate, self) if covariate.kind == "continuous" else None
         self.buttons = level_buttons(covariate, self) if covariate.kind == "binary" else []
-        self.reading = QLabel(self)
-        self.reading.setObjectName("muted")
+        self.reading = unit_label("", self)
+        self.reading.setMaximumWidth(READING_PX)
         self.set_home(covariate.centre, is_patient=False)
         self._pending: float | None = None
         self._settle = QTimer(self, singleShot=True, interval=SETTLE_MS)
@@ -49,9 +56,14 @@ class CovariateRow(QWidget):
 
     @property
     def reach(self) -> str:
-        """The range in words: ``1 to 233 months``, ``F to M``."""
-        low, high = map(self.covariate.format, self.covariate.range)
-        return f"{low.removesuffix(self.covariate.unit).strip()} to {high}"
+        """The range in words: ``1 to 233 months``, ``F or M``."""
+        return self.covariate.extent
+
+    @property
+    def stops(self) -> list[QWidget]:
+        """What the Tab key goes through, as it is read."""
+        boxes = [] if self.box is None else [self.box]
+        return [*boxes, self.reset, *self.buttons[:1], self.slider, *self.buttons[1:]]
 
     def set_home(self, value: float, is_patient: bool, interval: tuple[float, float] | None = None) -> None:
         """Say where the row is reset to.
@@ -65,7 +77,7 @@ class CovariateRow(QWidget):
         self.histogram.show_patient(value if is_patient else None, interval)
         whose = f"patient ({reading(self.covariate, value)})"
         mean = f"population mean ({mean_reading(self.covariate)})"
-        self.reset.setToolTip(f"Back to the {whose if is_patient else mean}")
+        self.reset.setToolTip(as_tip(f"Back to the {whose if is_patient else mean}"))
 
     def set_value(self, value: float) -> None:
         """Show a real value without telling anybody."""
@@ -76,7 +88,7 @@ class CovariateRow(QWidget):
         for button in self.buttons:
             button.setChecked(button.level == value)
         self.reset.setEnabled(value != self._home)
-        self.reading.setText(self.covariate.format(round(value, 2)))
+        self.reading.setText(reading(self.covariate, value))
 
     def forget_move(self) -> None:
         """Say no more of a movement that has not come to rest."""
@@ -93,14 +105,13 @@ class CovariateRow(QWidget):
         stripe = QFrame(self)
         stripe.setFixedWidth(4)
         stripe.setStyleSheet(f"background: {self._colour}; border-radius: 2px;")
-        name = QLabel(label(self.covariate.name), self)
+        name = ElidedLabel(label(self.covariate.name), self)
         name.setObjectName("covariate")
-        unit = QLabel(self.covariate.unit, self)
-        unit.setObjectName("muted")
+        name.setMinimumWidth(NAME_PX)
+        unit = unit_label(self.covariate.unit, self)
         head = QHBoxLayout()
-        head.setSpacing(6)
-        head.addWidget(name)
-        head.addStretch(1)
+        head.setSpacing(4)
+        head.addWidget(name, 1)
         for widget in (self.reading, self.box, unit, self.reset):
             if widget is not None:
                 head.addWidget(widget)

@@ -8,7 +8,6 @@ from PySide6.QtWidgets import QSlider, QWidget
 
 from naisr_model.covariates import Covariate
 from naisr_viewer.views.theme import Theme
-from naisr_viewer.words.numbers import decimals
 
 SLIDER_STEPS = 1000
 """Positions of a slider; a key press moves ten of them."""
@@ -33,7 +32,7 @@ def slider_value(covariate: Covariate, position: int) -> float:
 def chosen_value(covariate: Covariate, position: int) -> float:
     """The real value that is taken at a slider position: as round as it is shown, and the ends exactly."""
     value = slider_value(covariate, position)
-    return value if position in (0, SLIDER_STEPS) else round(value, decimals(covariate))
+    return value if position in (0, SLIDER_STEPS) else round(value, covariate.decimals)
 
 
 def track_x(share: float, width: int) -> float:

@@ -7,10 +7,22 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from PySide6.QtCore import QSize, QUrl
-from PySide6.QtGui import QDesktopServices, QKeySequence, QShortcut, QTextBlock, QTextCursor, QTextDocument
+from PySide6.QtGui import (
+    QDesktopServices,
+    QKeySequence,
+    QShortcut,
+    QTextBlock,
+    QTextBlockFormat,
+    QTextCursor,
+    QTextDocument,
+    QTextOption,
+)
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QPushButton, QTextBrowser, QVBoxLayout, QWidget
 
 FIRST_SIZE = QSize(860, 700)
+FRAME = QSize(8, 40)
+"""What a window manager puts around a window, at most."""
+
 MARGIN_PX = 18
 PAGE_ENDING = ".md"
 CONTENTS = f"index{PAGE_ENDING}"
@@ -28,12 +40,13 @@ class DocumentWindow(QDialog):
         super().__init__(parent)
         self._folder = folder
         self.setModal(False)
-        self.resize(FIRST_SIZE)
+        self.resize(FIRST_SIZE.boundedTo(self.screen().availableSize() - FRAME))
         self.browser = QTextBrowser(self)
         self.browser.setOpenLinks(False)
         self.browser.setAccessibleName("Document")
-        self.back = QPushButton("Back", self)
-        self.contents = QPushButton("Contents", self)
+        self.browser.setWordWrapMode(QTextOption.WrapMode.WrapAtWordBoundaryOrAnywhere)
+        self.back = QPushButton("&Back", self)
+        self.contents = QPushButton("&Contents", self)
         self._compose()
         self.browser.anchorClicked.connect(self._follow)
         self.browser.backwardAvailable.connect(self.back.setEnabled)
@@ -71,6 +84,7 @@ class DocumentWindow(QDialog):
     def _present(self) -> None:
         document = self.browser.document()
         document.setDocumentMargin(MARGIN_PX)
+        _break_lines(document)
         self.setWindowTitle(document.firstBlock().text() or "Documents")
 
     def _go_to(self, anchor: str) -> None:
@@ -95,9 +109,21 @@ def anchor_of(heading: str) -> str:
     return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
 
 
+def _break_lines(document: QTextDocument) -> None:
+    """Have listings wrapped; Qt keeps their lines whole, however wide that makes the page."""
+    breakable = QTextBlockFormat()
+    breakable.setNonBreakableLines(False)
+    for block in _blocks(document):
+        if block.blockFormat().nonBreakableLines():
+            QTextCursor(block).mergeBlockFormat(breakable)
+
+
 def _headings(document: QTextDocument) -> Iterator[QTextBlock]:
+    return (block for block in _blocks(document) if block.blockFormat().headingLevel())
+
+
+def _blocks(document: QTextDocument) -> Iterator[QTextBlock]:
     block = document.begin()
     while block.isValid():
-        if block.blockFormat().headingLevel():
-            yield block
+        yield block
         block = block.next()

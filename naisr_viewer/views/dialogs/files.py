@@ -59,6 +59,11 @@ def dropped(data: QMimeData) -> list[Path]:
     return [Path(url.toLocalFile()) for url in data.urls() if url.isLocalFile()]
 
 
+def is_scan(file: Path) -> bool:
+    """Whether a file has the ending of what can be opened as a scan."""
+    return file.name.lower().endswith(tuple(f".{ending}" for ending in SCAN_ENDINGS))
+
+
 def is_atlas(file: Path) -> bool:
     """Whether a file has the ending of an atlas."""
     return file.suffix.lower() == ATLAS_ENDING

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QDialog, QDialogButtonBox, QVBoxLayout
+from PySide6.QtWidgets import QComboBox, QDialog, QDialogButtonBox, QSizePolicy, QVBoxLayout
 
 
 def column_in(dialog: QDialog) -> QVBoxLayout:
-    """The column of a dialog, with room around it."""
+    """The column of a dialog, with room around it; no list in it makes it as wide as its longest name."""
+    for box in dialog.findChildren(QComboBox):
+        box.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+        box.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
     column = QVBoxLayout(dialog)
     column.setContentsMargins(18, 18, 18, 14)
     column.setSpacing(14)

@@ -5,18 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QLabel, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from naisr_model.covariates import Covariate
 from naisr_viewer.state.patients import Named, OpenScan
+from naisr_viewer.views.elided import ElidedCheckBox, unit_label
 from naisr_viewer.views.level_buttons import LevelButton, level_buttons
 from naisr_viewer.views.number_box import NumberBox
 from naisr_viewer.views.patients.pieces import button, exchange, grid_in, paragraph, section
-from naisr_viewer.words.titles import label
+from naisr_viewer.words.patients import sentence
+from naisr_viewer.words.titles import as_tip, label
 
 FIT_TIP = "Find the shape of the atlas that comes closest to the scan"
 
-ADVICE = "Tick what is known; the rest is inferred from the shape."
+ADVICE = "Tick what is known; the rest is inferred from the scan."
 NOTHING_TO_KNOW = "The shapes of this atlas depend on no covariates; there is nothing to be known."
 
 
@@ -74,7 +76,7 @@ class LevelField(QWidget):
         self.buttons = level_buttons(covariate, self)
         self.stops: list[QWidget] = [*self.buttons]
         for each in self.buttons:
-            each.setAccessibleName(f"{label(covariate.name)}: {each.text()}")
+            each.setAccessibleName(f"{label(covariate.name)}: {each.name}")
             each.clicked.connect(self._pressed)
             row.addWidget(each, 1)
 
@@ -110,13 +112,11 @@ class KnownRow:
     def __init__(self, covariate: Covariate, parent: QWidget) -> None:
         name = label(covariate.name)
         self.covariate = covariate
-        self.check = QCheckBox(name, parent)
+        self.check = ElidedCheckBox(name, "Tick what is known; the fit infers the rest", parent)
         self.check.setAccessibleName(f"{name} is known")
-        self.check.setToolTip(f"Tick where {name.lower()} is known; otherwise the fit infers it")
         make = NumberField if covariate.kind == "continuous" else LevelField
         self.field: NumberField | LevelField = make(covariate, parent)
-        self.note = QLabel(parent)
-        self.note.setObjectName("muted")
+        self.note = unit_label("", parent)
         self.give(None)
         self.check.clicked.connect(self._ticked)
         self.field.edited.connect(self._mark)
@@ -144,14 +144,12 @@ class KnownPart(QWidget):
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
         self.rows: dict[str, KnownRow] = {}
-        self.fit = button("Fit", FIT_TIP, "primary")
+        self.fit = button("Fit", FIT_TIP, "primary")  # for the panel, which keeps it in sight
         self._table = QWidget()
         column = section(self, "Known covariates")
         self._advice = paragraph(ADVICE, "muted")
         column.addWidget(self._advice)
         column.addWidget(self._table)
-        column.addSpacing(4)
-        column.addWidget(self.fit)
 
     def show_covariates(self, covariates: Sequence[Covariate]) -> None:
         """Make the rows of an atlas."""
@@ -168,7 +166,7 @@ class KnownPart(QWidget):
         """Show whether ``patient`` can be fitted; what is typed stays."""
         self.fit.setText("Fit again" if patient.fit else "Fit")
         self.fit.setEnabled(not patient.scan.blocked)
-        self.fit.setToolTip(patient.scan.blocked or FIT_TIP)
+        self.fit.setToolTip(as_tip(sentence(patient.scan.blocked) or FIT_TIP))
 
     def given(self) -> Named:
         """What is known, in the atlas's order."""
@@ -183,5 +181,4 @@ class KnownPart(QWidget):
 
     def stops(self) -> list[QWidget]:
         """What the Tab key goes through, in order."""
-        rows = self.rows.values()
-        return [*(stop for row in rows for stop in (row.check, *row.field.stops)), self.fit]
+        return [stop for row in self.rows.values() for stop in (row.check, *row.field.stops)]

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QSignalBlocker, QSize, Qt, Signal
-from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
+from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QListWidget,
     QListWidgetItem,
-    QSizePolicy,
     QToolButton,
     QWidget,
 )
 
 from naisr_viewer.state.patients import OpenScan
+from naisr_viewer.views.elided import ElidedLabel
 from naisr_viewer.words.numbers import volume
+from naisr_viewer.words.titles import as_tip
 
 ROWS_IN_SIGHT = 4
 """How many rows of the list are shown before it scrolls."""
@@ -24,21 +25,6 @@ ROW_HEIGHT = 30
 LIST_BORDER = 8
 
 AVERAGE = "Population average"
-
-
-class ElidedLabel(QLabel):
-    """One line that is shortened in its middle where it does not fit."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__(text)
-        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        """As much of the text as there is room for."""
-        text = self.fontMetrics().elidedText(self.text(), Qt.TextElideMode.ElideMiddle, self.width())
-        painter = QPainter(self)
-        painter.drawText(self.rect(), Qt.AlignmentFlag.AlignVCenter, text)
-        painter.end()
 
 
 class PatientList(QListWidget):
@@ -84,7 +70,7 @@ class PatientList(QListWidget):
         item = QListWidgetItem(self)
         item.setData(Qt.ItemDataRole.UserRole, key)
         item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{name}, {note}".removesuffix(", "))
-        item.setToolTip(tip)
+        item.setToolTip(as_tip(tip))
         item.setSizeHint(QSize(0, ROW_HEIGHT))
         muted = QLabel(note)
         muted.setObjectName("muted")

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 
-from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QObject, QSize, Qt, QTimer, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QScrollArea, QVBoxLayout, QWidget
 
 from naisr_model.covariates import Covariate
@@ -13,6 +12,7 @@ from naisr_viewer.panels.kinds import layouts_of
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Layout
 from naisr_viewer.state.patients import Named, OpenScan
+from naisr_viewer.views.focus import in_order
 from naisr_viewer.views.patients.known import KnownPart, NumberField
 from naisr_viewer.views.patients.list import PatientList
 from naisr_viewer.views.patients.pieces import button, exchange, paragraph
@@ -20,6 +20,8 @@ from naisr_viewer.views.patients.result import ComparePart, result_part
 from naisr_viewer.views.patients.scan import AlignmentPart, ScanPart
 
 PANEL_WIDTH = 300
+LEAST_WIDTH = 248
+MARGIN_PX = 14
 INVITATION = "Open a scan to fit the atlas to it: a mesh, a label volume or a cloud of points."
 
 
@@ -38,13 +40,14 @@ class PatientPanel(QFrame):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("patientBar")
-        self.setFixedWidth(PANEL_WIDTH)
+        self.setMinimumWidth(LEAST_WIDTH)
+        self.setMaximumWidth(PANEL_WIDTH)
         self._state = ExplorerState()
         self._drafts: dict[int, Named] = {}
         self._area = QScrollArea(self)
         self._inside = QWidget(self._area)
+        self._head, self._foot = QWidget(self), QWidget(self)
         self.open = button("Open scan…", "A mesh, a label volume or a cloud of points")
-        self.open.setParent(self._inside)  # the Tab key comes to what is taken in first
         self.invitation = paragraph(INVITATION, "muted")
         self.list = PatientList(self._inside)
         self.scan = ScanPart(self._inside)
@@ -67,17 +70,30 @@ class PatientPanel(QFrame):
         self.invitation.setVisible(not state.patients)
         self.list.setVisible(bool(state.patients))
         self.list.show_patients(state.patients, state.patient)
-        for part in (self.scan, self.alignment, self.known):
+        for part in (self.scan, self.alignment, self.known, self._foot):
             part.setVisible(state.shown is not None)
         self.result.setVisible(state.fit is not None)
         can_compare = state.atlas is not None and Layout.CHANGE in layouts_of(state.atlas)
         self.compare.setVisible(state.fit is not None and can_compare)
+        self.scan.changed.setVisible(state.shown is not None and state.shown.is_changed)
         if state.shown is not None:
             self._show_patient(state.shown, old.shown)
 
+    def sizeHint(self) -> QSize:
+        """As wide as it may be; a narrow window gives it less."""
+        return QSize(PANEL_WIDTH, super().sizeHint().height())
+
+    @property
+    def stops(self) -> list[QWidget]:
+        """What the Tab key goes through, as it is read."""
+        top = [self.open, self.scan.reread_changed, self._area, self.list, self.scan.reread, self.scan.ghost]
+        middle = [self.alignment.method, self.alignment.unit, *self.known.stops()]
+        return [*top, *middle, self.compare.box, self.known.fit]
+
     def set_editable(self, editable: bool) -> None:
         """Whether anything can be changed just now; it can be read and scrolled in any case."""
-        self._inside.setEnabled(editable)
+        for part in (self._head, self.scan.changed, self._inside, self._foot):
+            part.setEnabled(editable)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Let the wheel scroll the panel instead of changing what lies under the pointer."""
@@ -115,35 +131,44 @@ class PatientPanel(QFrame):
     def _show_rows(self, covariates: Sequence[Covariate]) -> None:
         """Made later than what stands below them, so that the Tab key has to be told."""
         self.known.show_covariates(covariates)
-        for first, second in pairwise([self.alignment.unit, *self.known.stops(), self.compare.box]):
-            QWidget.setTabOrder(first, second)
+        in_order(self.stops)
         for stop in self.known.stops():
             stop.installEventFilter(self)
 
     def _compose(self) -> None:
-        title = QLabel("Patients")
-        title.setObjectName("title")
-        head = QHBoxLayout()
-        head.addWidget(title, 1)
-        head.addWidget(self.open)
-        top = QVBoxLayout()
-        top.setSpacing(10)
-        top.addLayout(head)
-        top.addWidget(self.invitation)
-        top.addWidget(self.list)
+        """What concerns the shown patient scrolls; what opens, warns and fits stays in sight."""
         column = QVBoxLayout(self._inside)
-        column.setContentsMargins(18, 16, 18, 16)
+        column.setContentsMargins(MARGIN_PX, 2, MARGIN_PX, 12)
         column.setSpacing(20)
-        column.addLayout(top)
-        for part in (self.scan, self.alignment, self.known, self.result, self.compare):
+        for part in (self.invitation, self.list, self.scan, self.alignment, self.known, self.result):
             column.addWidget(part)
+        column.addWidget(self.compare)
         column.addStretch(1)
         self._area.setWidget(self._inside)
         self._area.setWidgetResizable(True)
         self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        warning = QVBoxLayout()
+        warning.setContentsMargins(MARGIN_PX, 0, MARGIN_PX, 8)
+        warning.addWidget(self.scan.changed)
+        foot = QVBoxLayout(self._foot)
+        foot.setContentsMargins(MARGIN_PX, 8, MARGIN_PX, 10)
+        foot.addWidget(self.known.fit)
         outer = QVBoxLayout(self)
         outer.setContentsMargins(1, 0, 0, 0)
-        outer.addWidget(self._area)
+        outer.setSpacing(0)
+        outer.addWidget(self._head)
+        outer.addLayout(warning)
+        outer.addWidget(self._area, 1)
+        outer.addWidget(self._foot)
+        self._compose_head()
+
+    def _compose_head(self) -> None:
+        title = QLabel("Patients")
+        title.setObjectName("title")
+        head = QHBoxLayout(self._head)
+        head.setContentsMargins(MARGIN_PX, 16, MARGIN_PX, 8)
+        head.addWidget(title, 1)
+        head.addWidget(self.open)
 
     def _connect(self) -> None:
         self.open.clicked.connect(self.open_requested)

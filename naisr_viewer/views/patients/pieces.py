@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
 )
 
 from naisr_viewer.words.patients import sentence
+from naisr_viewer.words.titles import as_tip
 
 SIGN_PX = 16
 
@@ -100,6 +101,7 @@ class ChoiceBox(QComboBox):
     def __init__(self, name: str, tip: str, parent: QWidget) -> None:
         super().__init__(parent)
         self.setAccessibleName(name)
+        self._tip = tip
         self.setToolTip(tip)
         self.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         self.setMinimumContentsLength(8)
@@ -112,9 +114,11 @@ class ChoiceBox(QComboBox):
         with QSignalBlocker(self):
             if wanted != [(self.itemData(i), self.itemText(i)) for i in range(self.count())]:
                 self.clear()
-                for data, text in wanted:
+                for index, (data, text) in enumerate(wanted):
                     self.addItem(text, data)
+                    self.setItemData(index, as_tip(text), Qt.ItemDataRole.ToolTipRole)
             self.setCurrentIndex([data for data, _ in wanted].index(current))
+        self.setToolTip(as_tip(f"{self._tip}:\n{self.currentText()}"))
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """The style sheet takes the arrow away with the frame; draw another."""

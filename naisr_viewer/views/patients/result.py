@@ -11,7 +11,7 @@ from naisr_model.covariates import Covariate
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.patients import Fitted
 from naisr_viewer.views.patients.pieces import ChoiceBox, grid_in, paragraph, section, warnings
-from naisr_viewer.words.patients import findings
+from naisr_viewer.words.patients import LONGEST_IN_TABLE, breakable, findings
 
 
 def result_part(fit: Fitted, covariates: Sequence[Covariate]) -> QWidget:
@@ -24,12 +24,12 @@ def result_part(fit: Fitted, covariates: Sequence[Covariate]) -> QWidget:
     grid = grid_in(table, 12, 0, wide=1)
     top, right = Qt.AlignmentFlag.AlignTop, Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignRight
     for row, (what, value, sure) in enumerate(findings(fit, covariates)):
-        figure = paragraph(value, "figure", right)
+        figure = paragraph(breakable(value, LONGEST_IN_TABLE), "figure", right)
         figure.setAccessibleName(f"{what}: {value}")
-        grid.addWidget(paragraph(what, "muted", top), 3 * row, 0)
+        grid.addWidget(paragraph(breakable(what, LONGEST_IN_TABLE), "muted", top), 3 * row, 0)
         grid.addWidget(figure, 3 * row, 1)
         if sure:
-            grid.addWidget(paragraph(sure, "muted", right), 3 * row + 1, 0, 1, 2)
+            grid.addWidget(paragraph(breakable(sure), "muted", right), 3 * row + 1, 0, 1, 2)
         grid.setRowMinimumHeight(3 * row + 2, 6)
     return part
 

@@ -6,14 +6,17 @@ from dataclasses import replace
 from pathlib import Path
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QCheckBox, QFormLayout, QFrame, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFormLayout, QFrame, QHBoxLayout, QVBoxLayout, QWidget
 
 from naisr_viewer.state.patients import Method, OpenScan, Reading
 from naisr_viewer.views.dialogs.files import ask_landmarks_path
+from naisr_viewer.views.elided import ElidedCheckBox, ElidedLabel
 from naisr_viewer.views.patients.pieces import ChoiceBox, button, exchange, paragraph, section, warnings
 from naisr_viewer.words.patients import METHODS, breakable, measured, sentence, units
+from naisr_viewer.words.titles import as_tip
 
 REREAD_TIP = "Read the file from the disk again, for example after it was edited"
+GHOST_TIP = "Draw what was measured, transparent, over the atlas's shape"
 SEE_FIRST = "The scan is drawn over the atlas as it lies; see that it fits before it is fitted."
 
 
@@ -24,7 +27,8 @@ class ScanPart(QWidget):
         super().__init__(parent)
         self.reread = button("Read again", REREAD_TIP, "small")
         self.reread_changed = button("Read again", REREAD_TIP)
-        self.changed = QFrame()
+        self.told_changed = ElidedLabel("File changed on disk")
+        self.changed = QFrame()  # for the panel, which keeps it in sight
         self.changed.setObjectName("changed")
         self.source = paragraph()
         self.volume = paragraph(style="muted")
@@ -32,15 +36,14 @@ class ScanPart(QWidget):
         self.notes = QWidget()
         self._notes_shown: tuple[str, ...] = ()
         self.repairs = paragraph(style="muted")
-        self.ghost = QCheckBox("Show the scan over the shape")
-        self.ghost.setToolTip("Draw what was measured, transparent, over the atlas's shape")
+        self.ghost = ElidedCheckBox("Show the scan over the shape", GHOST_TIP, self)
         self._compose()
 
     def show_patient(self, patient: OpenScan, has_ghost: bool) -> None:
         """Show ``patient``'s scan."""
         scan = patient.scan
         self.source.setText(breakable(scan.source))
-        self.source.setToolTip(str(patient.reading.path))
+        self.source.setToolTip(as_tip(str(patient.reading.path)))
         self.volume.setText(measured(scan))
         if scan.notes != self._notes_shown:
             self._notes_shown = scan.notes
@@ -50,21 +53,20 @@ class ScanPart(QWidget):
         self.repairs.setVisible(bool(scan.repairs))
         self.blocked.setText(sentence(scan.blocked))
         self.blocked.setVisible(bool(scan.blocked))
-        self.changed.setVisible(patient.is_changed)
+        self.told_changed.set_hint(f"{patient.reading.path} has changed since it was read")
         self.reread.setVisible(not patient.is_changed)
         self.ghost.setChecked(has_ghost)
 
     def _compose(self) -> None:
         notice = QHBoxLayout(self.changed)
         notice.setContentsMargins(10, 8, 8, 8)
-        notice.addWidget(paragraph("The file has changed on disk"), 1)
+        notice.addWidget(self.told_changed, 1)
         notice.addWidget(self.reread_changed)
         facts = QVBoxLayout()
         facts.setSpacing(2)
         facts.addWidget(self.source)
         facts.addWidget(self.volume)
         column = section(self, "Scan", self.reread)
-        column.addWidget(self.changed)
         column.addLayout(facts)
         for widget in (self.blocked, self.notes, self.repairs, self.ghost):
             column.addWidget(widget)

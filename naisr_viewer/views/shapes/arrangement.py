@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from PySide6.QtCore import QRect, QSize
 
 TITLE_PX = 36
 CAPTION_PX = 52
-"""Strips above and beneath each shape, kept free for words."""
+"""Strips above and beneath each shape, where words lie over whatever grows into them."""
 
 LEAST_WIDTH_PX = 150
 """Of a panel; captions are hardly wider."""
+
+LEAST_SHAPE_PX = 80
+"""Height of a shape; rows that would leave less are scrolled to."""
 
 ROOM = 1.25
 """A shape is framed with this much room, so that it can grow while a slider moves."""
@@ -20,8 +24,22 @@ Viewport = tuple[float, float, float, float]
 """Left, bottom, right and top as shares of the canvas, counted from its lower left corner."""
 
 
-def columns_for(count: int, canvas: QSize, strip: int, shape_aspect: float) -> int:
-    """Columns of a grid of ``count`` panels in which a shape is drawn largest and captions have their room.
+class Rows(NamedTuple):
+    """How panels are divided into rows.
+
+    Attributes:
+        columns: panels in a row.
+        total: rows in all.
+        in_sight: rows on screen at a time.
+    """
+
+    columns: int
+    total: int
+    in_sight: int
+
+
+def rows_for(count: int, canvas: QSize, strip: int, shape_aspect: float) -> Rows:
+    """The grid of ``count`` panels in which a shape is drawn largest and captions have their room.
 
     Args:
         count: how many panels.
@@ -29,13 +47,19 @@ def columns_for(count: int, canvas: QSize, strip: int, shape_aspect: float) -> i
         strip: pixels beneath every shape for colour bars.
         shape_aspect: width over height of a shape as seen.
     """
+    most = max(1, canvas.height() // (TITLE_PX + CAPTION_PX + strip + LEAST_SHAPE_PX))
 
-    def shape_px(columns: int) -> float:
+    def grid(columns: int) -> Rows:
         rows = -(-count // columns)
-        return min(height_left(canvas.height() / rows, strip), canvas.width() / columns / shape_aspect)
+        return Rows(columns, rows, min(rows, most))
+
+    def shape_px(rows: Rows) -> float:
+        high = height_left(canvas.height() / rows.in_sight, strip)
+        return min(high, canvas.width() / rows.columns / shape_aspect)
 
     wide_enough = [columns for columns in range(1, count + 1) if canvas.width() >= columns * LEAST_WIDTH_PX]
-    return max(wide_enough or [1], key=lambda columns: (round(shape_px(columns), 6), -columns))
+    grids = [grid(columns) for columns in wide_enough or [1]]
+    return max(grids, key=lambda rows: (rows.in_sight - rows.total, round(shape_px(rows), 6), -rows.columns))
 
 
 def cells(count: int, columns: int) -> list[tuple[float, float, float, float]]:
@@ -47,23 +71,30 @@ def cells(count: int, columns: int) -> list[tuple[float, float, float, float]]:
     return [*places[:-1], (left, top, 1 - left, height)]
 
 
-def areas_for(count: int, canvas: QSize, strip: int, shape_aspect: float) -> list[QRect]:
-    """Where each of ``count`` panels is on a canvas (px), words included.
+def areas_for(count: int, canvas: QSize, rows: Rows, first_row: int = 0) -> list[QRect | None]:
+    """Where each of ``count`` panels is on a canvas (px), words included; None of one that is out of sight.
 
     Args:
         count: how many panels.
         canvas: its size (px).
-        strip: pixels beneath every shape for colour bars.
-        shape_aspect: width over height of a shape as seen.
+        rows: how they are divided.
+        first_row: the uppermost row in sight.
     """
-    columns = columns_for(count, canvas, strip, shape_aspect)
-    return [_pixels(place, canvas) for place in cells(count, columns)]
+    height = canvas.height() / rows.in_sight
+    whole = _pixels_of(cells(count, rows.columns), canvas.width(), height * rows.total, height * first_row)
+    return [area if 0 <= area.top() < canvas.height() else None for area in whole]
 
 
-def _pixels(place: tuple[float, float, float, float], canvas: QSize) -> QRect:
-    left, top = round(place[0] * canvas.width()), round(place[1] * canvas.height())
-    right, bottom = (place[0] + place[2]) * canvas.width(), (place[1] + place[3]) * canvas.height()
-    return QRect(left, top, round(right) - left, round(bottom) - top)
+def _pixels_of(
+    places: Sequence[tuple[float, float, float, float]], width: float, height: float, scrolled: float
+) -> list[QRect]:
+    """Whole pixels; edges that two panels share are the same ones."""
+    areas = []
+    for left, top, wide, high in places:
+        x, y = round(left * width), round(top * height - scrolled)
+        right, bottom = round((left + wide) * width), round((top + high) * height - scrolled)
+        areas.append(QRect(x, y, right - x, bottom - y))
+    return areas
 
 
 def drawn_height(area: QRect, strip: int) -> int:
@@ -77,21 +108,27 @@ def drawn_height(area: QRect, strip: int) -> int:
 
 
 def height_left(height: float, strip: int) -> float:
-    """What title, caption and colour bars leave of a panel's height (px)."""
-    return max(height - TITLE_PX - CAPTION_PX - strip, 1)
+    """What title, caption and colour bars leave of a panel's height (px), and never less than a third."""
+    return max(height - TITLE_PX - CAPTION_PX - strip, height / 3, 1)
 
 
-def viewport(area: QRect, canvas: QSize, strip: int) -> Viewport:
-    """Where the shape is drawn inside ``area``, between its title and its caption."""
-    top = area.top() + TITLE_PX
-    bottom = top + drawn_height(area, strip)
+def viewport(area: QRect, canvas: QSize) -> Viewport:
+    """What of the canvas is drawn on for ``area``: all of it, so that nothing is cut along the words."""
     left, right = area.left() / canvas.width(), (area.left() + area.width()) / canvas.width()
-    return left, 1 - bottom / canvas.height(), right, 1 - top / canvas.height()
+    top, bottom = area.top() / canvas.height(), (area.top() + area.height()) / canvas.height()
+    return left, 1 - bottom, right, 1 - top
+
+
+def eye_level(area: QRect, strip: int) -> float:
+    """How far the middle between title and caption is above that of the panel, in halves of its height."""
+    above = (CAPTION_PX + strip - TITLE_PX) / max(area.height(), 1)
+    return min(above, 1 - drawn_height(area, strip) / max(area.height(), 1))
 
 
 def scale_to_fit(area: QRect, strip: int, wide_mm: float, high_mm: float) -> float:
-    """Millimetres from the middle to the top of a sub-plot in which a box so wide and high fits."""
-    return ROOM * max(high_mm, wide_mm * drawn_height(area, strip) / area.width()) / 2
+    """Millimetres from the middle to the top of a panel between whose words a box so wide and high fits."""
+    drawn_px = drawn_height(area, strip)
+    return ROOM * max(high_mm / drawn_px, wide_mm / area.width()) * area.height() / 2
 
 
 def separators(areas: Sequence[QRect]) -> set[tuple[int, int, int, int]]:

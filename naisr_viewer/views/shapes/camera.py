@@ -43,3 +43,20 @@ def seen_size(camera: pv.Camera, box_mm: NDArray[np.float64]) -> tuple[float, fl
     up = np.cross(right, forward / np.linalg.norm(forward))
     size = box_mm[:, 1] - box_mm[:, 0]
     return float(np.abs(right) @ size), float(np.abs(up) @ size)
+
+
+def is_any_seen(camera: pv.Camera, points_mm: NDArray[np.floating], aspect: float) -> bool:
+    """Whether any of ``points_mm [n, 3]`` is inside a sub-plot, without perspective.
+
+    Args:
+        camera: looks at it.
+        points_mm: vertices.
+        aspect: width over height of the sub-plot.
+    """
+    forward = np.subtract(camera.focal_point, camera.position)
+    right = np.cross(forward, camera.up)
+    right /= np.linalg.norm(right)
+    up = np.cross(right, forward / np.linalg.norm(forward))
+    places = (points_mm - np.asarray(camera.focal_point)) @ np.stack([right, up], axis=1)
+    shares = places / camera.parallel_scale / (aspect, 1.0) - np.asarray(camera.GetWindowCenter())
+    return bool((np.abs(shares) < 1).all(axis=1).any())

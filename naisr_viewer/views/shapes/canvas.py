@@ -14,7 +14,7 @@ from pyvistaqt import QtInteractor
 
 from naisr_viewer.state.requests import SurfaceResult
 from naisr_viewer.views.shapes.arrangement import Viewport
-from naisr_viewer.views.shapes.camera import Direction, aim, seen_size
+from naisr_viewer.views.shapes.camera import Direction, aim, is_any_seen, seen_size
 from naisr_viewer.views.shapes.looks import POINT_PX, as_ghost
 from naisr_viewer.views.shapes.sub_plot import SubPlot, set_colouring, set_points
 
@@ -98,6 +98,15 @@ class Canvas(QtInteractor):
                 plot.ghost.prop.color = ghost
         self.refresh()
 
+    def is_any_missed(self) -> bool:
+        """Whether nothing is seen of the surface of a sub-plot."""
+        shown = [plot for plot in self._plots if plot.is_shown and plot.mesh.n_points]
+        return any(not is_any_seen(self.camera, plot.mesh.points, self._aspect(plot)) for plot in shown)
+
+    def set_eye_level(self, share: float) -> None:
+        """Draw what the camera looks at above the middle of each sub-plot, by a share of half its height."""
+        self.camera.SetWindowCenter(0.0, -share)
+
     def set_viewports(self, viewports: Sequence[Viewport | None]) -> None:
         """Say where each sub-plot is; None hides it."""
         for plot, viewport in zip(self._plots, viewports, strict=True):
@@ -128,6 +137,13 @@ class Canvas(QtInteractor):
         for plot in self._plots:
             plot.is_stale = True
         self.update()
+
+    def devicePixelRatioF(self) -> float:
+        """Pixels of the screen per pixel of Qt, a trace more than that.
+
+        Qt rounds half a pixel up, Python to the even one: without the trace VTK would leave a line undrawn.
+        """
+        return super().devicePixelRatioF() + 1e-9
 
     def initializeGL(self) -> None:
         """Start with a new frame buffer."""
@@ -172,6 +188,11 @@ class Canvas(QtInteractor):
         self.close()
         self._forget_context()  # Qt deletes context and surface; Python must not know them any longer
         self.deleteLater()
+
+    def _aspect(self, plot: SubPlot) -> float:
+        """Width over height of a sub-plot."""
+        left, bottom, right, top = plot.renderer.GetViewport()
+        return float((right - left) * self.width() / max((top - bottom) * self.height(), 1.0))
 
     def _set_held(self, held: bool) -> None:
         self._is_held = held

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from PySide6.QtCore import QRect, Qt
+from PySide6.QtCore import QRect, QRectF, Qt
+from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QLabel, QWidget
 
 from naisr_viewer.panels.kinds import kind_of, title_of
@@ -13,8 +14,12 @@ from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.layouts import Panel
 from naisr_viewer.state.requests import SurfaceResult
 from naisr_viewer.views.colours import panel_colour
+from naisr_viewer.views.elided import ElidedLabel
 from naisr_viewer.views.shapes.arrangement import CAPTION_PX, TITLE_PX
 from naisr_viewer.views.shapes.colour_bar import HEIGHT_PX, WIDTH_PX, ColourBar
+
+MARGIN_PX = 10
+DOT_PX = 10
 
 
 def strip_height(panels: Sequence[Panel]) -> int:
@@ -22,18 +27,44 @@ def strip_height(panels: Sequence[Panel]) -> int:
     return HEIGHT_PX if any(kind_of(panel).scale for panel in panels) else 0
 
 
+class Title(ElidedLabel):
+    """A dot in the colour of a surface, and what it is.
+
+    Args:
+        text: what stands there.
+        colour: of the dot, ``#rrggbb``.
+        parent: the widget around it.
+    """
+
+    def __init__(self, text: str, colour: str, parent: QWidget) -> None:
+        super().__init__(text, parent)
+        self._colour = QColor(colour)
+        self.setObjectName("panelTitle")
+        self.keep_free(MARGIN_PX + 2 * DOT_PX, MARGIN_PX)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """The dot before the words."""
+        super().paintEvent(event)
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(self._colour)
+        painter.drawEllipse(QRectF(MARGIN_PX, (self.height() - DOT_PX) / 2, DOT_PX, DOT_PX))
+        painter.end()
+
+
 @dataclass(eq=False)
 class Cell:
     """One sub-plot on screen.
 
     Attributes:
-        title: the label above.
+        title: what stands above.
         caption: the label beneath.
         bar: what its colours stand for; None where it has none.
         result: the surface, or None as long as there is none.
     """
 
-    title: QLabel
+    title: Title
     caption: QLabel
     bar: ColourBar | None
     result: SurfaceResult | None = None
@@ -49,12 +80,15 @@ class Cell:
         return [self.title, self.caption, *([] if self.bar is None else [self.bar])]
 
     def place(self, area: QRect, strip: int) -> None:
-        """The title above the shape; beneath it the colour bar, and the caption under that."""
+        """The title above the shape; beneath it the colour bar, and the caption under that.
+
+        Words that need more lines than usual begin higher up.
+        """
         self.title.setGeometry(area.left(), area.top(), area.width(), TITLE_PX)
-        height = CAPTION_PX + strip
-        top = area.top() + area.height() - height
-        self.caption.setGeometry(area.left(), top, area.width(), height)
         self.caption.setContentsMargins(0, strip, 0, 0)
+        height = max(CAPTION_PX + strip, self.caption.heightForWidth(area.width()))
+        top = area.top() + max(area.height() - height, TITLE_PX)
+        self.caption.setGeometry(area.left(), top, area.width(), area.bottom() + 1 - top)
         if self.bar is not None:
             width = min(WIDTH_PX, area.width())
             self.bar.setGeometry(area.left() + (area.width() - width) // 2, top, width, HEIGHT_PX)
@@ -62,13 +96,12 @@ class Cell:
 
 def make_cell(panel: Panel, atlas: AtlasCard, parent: QWidget) -> Cell:
     """The labels of a sub-plot, still without a place, and its colour bar where it has one."""
-    colour = panel_colour(atlas, panel)
-    title = QLabel(f'<span style="color:{colour}">●</span>&nbsp;{title_of(panel)}', parent)
-    title.setObjectName("panelTitle")
-    title.setToolTip(kind_of(panel).hint)
+    title = Title(title_of(panel), panel_colour(atlas, panel), parent)
+    title.set_hint(kind_of(panel).hint)
     title.setWhatsThis(kind_of(panel).hint)
     caption = QLabel(parent)
     caption.setObjectName("caption")
+    caption.setWordWrap(True)
     caption.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
     scale = kind_of(panel).scale
     bar = None if scale is None else ColourBar(scale, kind_of(panel).unit, parent)

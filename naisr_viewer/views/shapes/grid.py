@@ -26,6 +26,8 @@ class Grid:
     def __init__(self, parent: QWidget) -> None:
         self._parent = parent
         self._lines: list[QFrame] = []
+        self._areas: Mapping[Panel, QRect] = {}
+        self._strip = 0
         self.cells: dict[Panel, Cell] = {}
 
     def fill(self, panels: Sequence[Panel], atlas: AtlasCard) -> None:
@@ -40,11 +42,19 @@ class Grid:
                 widget.deleteLater()
         for line in self._lines:
             line.deleteLater()
-        self.cells, self._lines = {}, []
+        self.cells, self._lines, self._areas = {}, [], {}
 
     def index(self, panel: Panel) -> int:
         """Which of the canvas's sub-plots a panel has."""
         return list(self.cells).index(panel)
+
+    def say(self, panel: Panel, text: str, hint: str) -> None:
+        """The line beneath a sub-plot, and more about it on hover."""
+        cell = self.cells[panel]
+        cell.caption.setText(text)
+        cell.caption.setToolTip(hint)
+        if panel in self._areas:
+            cell.place(self._areas[panel], self._strip)
 
     def place(self, areas: Mapping[Panel, QRect], strip: int) -> None:
         """Show the cells that have an area and hide the others.
@@ -53,6 +63,7 @@ class Grid:
             areas: where the panels on screen are (px), words included.
             strip: pixels beneath every shape for colour bars.
         """
+        self._areas, self._strip = areas, strip
         for panel, cell in self.cells.items():
             if panel in areas:
                 cell.place(areas[panel], strip)

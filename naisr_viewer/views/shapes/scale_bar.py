@@ -40,7 +40,7 @@ class ScaleBar(QWidget):
         """The label at the right end, the line before it."""
         length_mm = round_length_mm(self.pixels_per_mm)
         painter = QPainter(self)
-        text = f"{length_mm:g} mm"
+        text = f"{length_mm:,.0f} mm" if length_mm >= 1 else f"{length_mm:g} mm"
         room = painter.fontMetrics().horizontalAdvance(text) + 14
         right, middle = self.width() - room - 6.0, self.height() / 2
         left = right - length_mm * self.pixels_per_mm

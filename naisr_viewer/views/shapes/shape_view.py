@@ -7,20 +7,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
 
 from naisr_viewer.panels.kinds import all_panels
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.layouts import FULL_SHAPE, Panel
 from naisr_viewer.state.requests import SurfaceResult
 from naisr_viewer.views.colours import ghost_colour, panel_colour
-from naisr_viewer.views.shapes.arrangement import areas_for, drawn_height, scale_to_fit, viewport
-from naisr_viewer.views.shapes.camera import DIRECTIONS, OBLIQUE
+from naisr_viewer.views.shapes.arrangement import Rows, areas_for, eye_level, rows_for, scale_to_fit, viewport
+from naisr_viewer.views.shapes.camera import DIRECTIONS, OBLIQUE, Direction
 from naisr_viewer.views.shapes.cell import strip_height
 from naisr_viewer.views.shapes.drawing import Drawing, reserve_opengl
 from naisr_viewer.views.shapes.grid import Grid
+from naisr_viewer.views.shapes.row_scroll import row_scroll, show_rows
 from naisr_viewer.views.theme import LIGHT, Theme
 
 if TYPE_CHECKING:
@@ -56,14 +57,18 @@ class ShapeView(QWidget):
         self._visible: tuple[Panel, ...] = ()
         self._ghost: tuple[NDArray[np.float32] | None, NDArray[np.int64]] = (None, NO_FACES)
         self._direction = OBLIQUE
-        self._framed = False
+        self._framed = self._looked_after = False
         self._moving = False
         self._seen_mm = (1.0, 1.5)
         self._fit_scale = 1.0
-        self._drawn_height = 1
+        self._height = 1
         self._pixels_per_mm = 0.0
-        self._area = QVBoxLayout(self)
+        self.row_bar = row_scroll(self)
+        self.row_bar.valueChanged.connect(lambda _: self._arrange())
+        self._area = QHBoxLayout(self)
         self._area.setContentsMargins(0, 0, 0, 0)
+        self._area.setSpacing(0)
+        self._area.addWidget(self.row_bar, 0, Qt.AlignmentFlag.AlignRight)
 
     @property
     def canvas(self) -> Canvas | None:
@@ -93,7 +98,10 @@ class ShapeView(QWidget):
         """Put these sub-plots on screen and hide the others."""
         if tuple(panels) != self._visible:
             self._visible = tuple(panels)
+            self.row_bar.setValue(0)
             self._arrange()
+            self._looked_after = False
+            self._look_after()
 
     def show_surface(self, result: SurfaceResult) -> None:
         """Replace one surface in place; all that are replaced before Qt paints again share one painting."""
@@ -103,7 +111,7 @@ class ShapeView(QWidget):
             cell.bar.set_limit(result.colouring.limit)
         if self._canvas is not None:
             self._canvas.set_surface(self._grid.index(result.request.panel), result)
-            self._frame_once(self._canvas)
+            self._look_after()
 
     def clear_surface(self, panel: Panel) -> None:
         """Show nothing until the next surface comes."""
@@ -130,8 +138,7 @@ class ShapeView(QWidget):
 
     def set_caption(self, panel: Panel, text: str, hint: str) -> None:
         """The line beneath a sub-plot, and more about it on hover."""
-        self._grid.cells[panel].caption.setText(text)
-        self._grid.cells[panel].caption.setToolTip(hint)
+        self._grid.say(panel, text, hint)
 
     def caption(self, panel: Panel) -> str:
         """The line beneath a sub-plot."""
@@ -154,20 +161,12 @@ class ShapeView(QWidget):
             self._canvas.set_colours(theme.canvas, ghost_colour(theme))
 
     def reset_camera(self) -> None:
-        """Frame what is on screen, keeping the direction."""
-        box_mm = None if self._canvas is None else self._canvas.box_mm()
-        if self._canvas is None or box_mm is None:
-            return
-        self._seen_mm = self._canvas.frame(box_mm)
-        self._arrange()
-        self._canvas.camera.parallel_scale = self._fit_scale
+        """The view that an atlas opens with: its direction, upright, with all that is on screen in it."""
+        self._look(OBLIQUE)
 
     def look_from(self, direction: str) -> None:
         """Stand at one of :data:`DIRECTIONS` and frame what is on screen."""
-        self._direction = DIRECTIONS[direction]
-        if self._canvas is not None:
-            self._canvas.look(*self._direction)
-            self.reset_camera()
+        self._look(DIRECTIONS[direction])
 
     def clear(self) -> None:
         """Release the render window and all labels; nothing is drawn afterwards."""
@@ -190,10 +189,10 @@ class ShapeView(QWidget):
         colours = [panel_colour(self._atlas, panel) for panel in self._grid.cells]
         self._canvas = make_canvas(colours, self)
         self._canvas.drawn.connect(self._tell_drawn)
-        self._area.addWidget(self._canvas)
+        self._area.insertWidget(0, self._canvas, 1)
         self._canvas.show()  # the layout would only do so with the next turn of the event loop
         self._canvas.look(*self._direction)
-        self._framed = False
+        self._framed = self._looked_after = False
         self.set_theme(self._theme)
         self._canvas.set_moving(self._moving)
         for index, cell in enumerate(self._grid.cells.values()):
@@ -201,7 +200,7 @@ class ShapeView(QWidget):
                 self._canvas.set_surface(index, cell.result)
         self._canvas.set_ghost(self._grid.index(FULL_SHAPE), *self._ghost)
         self._arrange()
-        self._frame_once(self._canvas)
+        self._look_after()
 
     def _close_canvas(self) -> None:
         if self._canvas is not None:
@@ -209,11 +208,31 @@ class ShapeView(QWidget):
             self._canvas.release()
             self._canvas = None
 
-    def _frame_once(self, canvas: Canvas) -> None:
-        """Frame the first surfaces; afterwards the camera is the user's."""
-        if not self._framed and canvas.box_mm() is not None:
-            self.reset_camera()
-            self._framed = all(self._grid.cells[panel].has_surface for panel in self._visible)
+    def _look(self, direction: tuple[Direction, Direction]) -> None:
+        self._direction = direction
+        if self._canvas is not None:
+            self._canvas.look(*direction)
+            self._frame(self._canvas)
+
+    def _frame(self, canvas: Canvas) -> None:
+        """Frame what is on screen, keeping the direction."""
+        box_mm = canvas.box_mm()
+        if box_mm is not None:
+            self._seen_mm = canvas.frame(box_mm)
+            self._arrange()
+            canvas.camera.parallel_scale = self._fit_scale
+
+    def _look_after(self) -> None:
+        """Frame the first surfaces, and those of a layout in which nothing of one would be seen.
+
+        Otherwise the camera is the user's.
+        """
+        if self._canvas is None or self._looked_after or self._canvas.box_mm() is None:
+            return
+        is_complete = all(self._grid.cells[panel].has_surface for panel in self._visible)
+        if not self._framed or (is_complete and self._canvas.is_any_missed()):
+            self._frame(self._canvas)
+        self._framed, self._looked_after = self._framed or is_complete, is_complete
 
     def _arrange(self) -> None:
         """Divide the canvas among the visible panels, keeping the user's zoom."""
@@ -221,19 +240,31 @@ class ShapeView(QWidget):
             return
         wide_mm, high_mm = self._seen_mm
         strip = strip_height(self._visible)
-        places = areas_for(len(self._visible), self.size(), strip, wide_mm / high_mm)
-        areas = dict(zip(self._visible, places, strict=True))
-        self._drawn_height = drawn_height(places[0], strip)
-        old_fit, self._fit_scale = self._fit_scale, scale_to_fit(places[0], strip, wide_mm, high_mm)
+        rows, room = self._rows(strip, wide_mm / high_mm)
+        show_rows(self.row_bar, rows)
+        places = areas_for(len(self._visible), room, rows, self.row_bar.value())
+        areas = {panel: area for panel, area in zip(self._visible, places, strict=True) if area is not None}
+        first = next(iter(areas.values()))
+        self._height = first.height()
+        old_fit, self._fit_scale = self._fit_scale, scale_to_fit(first, strip, wide_mm, high_mm)
         if self._canvas is not None:
             self._canvas.camera.parallel_scale *= self._fit_scale / old_fit
-            ports = {panel: viewport(area, self.size(), strip) for panel, area in areas.items()}
+            self._canvas.set_eye_level(eye_level(first, strip))
+            ports = {panel: viewport(area, room) for panel, area in areas.items()}
             self._canvas.set_viewports([ports.get(panel) for panel in self._grid.cells])
         self._grid.place(areas, strip)
 
+    def _rows(self, strip: int, aspect: float) -> tuple[Rows, QSize]:
+        """How the panels are divided, and the room that they have beside a scroll bar where one is needed."""
+        rows = rows_for(len(self._visible), self.size(), strip, aspect)
+        if rows.in_sight == rows.total:
+            return rows, self.size()
+        room = QSize(self.width() - self.row_bar.sizeHint().width(), self.height())
+        return rows_for(len(self._visible), room, strip, aspect), room
+
     def _tell_drawn(self, count: int) -> None:
         if self._canvas is not None and self._framed:
-            scale = self._drawn_height / (2 * self._canvas.camera.parallel_scale)
+            scale = self._height / (2 * self._canvas.camera.parallel_scale)
             if scale != self._pixels_per_mm:
                 self._pixels_per_mm = scale
                 self.scale_changed.emit(scale)

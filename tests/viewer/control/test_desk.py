@@ -141,7 +141,7 @@ def test_a_fit_ends_at_the_patient_with_an_interval(fitted):
     assert volume(state.fit.volume_cm3, state.fit.volume_margin_cm3) in window.shapes.caption(FULL_SHAPE)
     assert controller.shown[SCAN].colouring is not None
     assert controller.shown[UNCERTAINTY].colouring is not None
-    assert "mean distance" in window.shapes.caption(SCAN)
+    assert f"residual {state.fit.residual_mm:.2f} mm" in window.shapes.caption(SCAN)
 
 
 def test_what_was_not_given_is_inferred(ready, qtbot, scan_file):

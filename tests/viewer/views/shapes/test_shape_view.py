@@ -13,7 +13,7 @@ import trimesh
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QColor, QImage
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtWidgets import QLabel, QScrollBar, QWidget
 from pytestqt.qtbot import QtBot
 
 from naisr_viewer.panels import scan, shape
@@ -283,6 +283,94 @@ def test_the_users_zoom_survives_a_new_layout(view):
     zoomed = camera.parallel_scale
     view.reset_camera()
     assert camera.parallel_scale / zoomed == pytest.approx(2.0)
+
+
+def test_another_layout_never_shows_a_sub_plot_beside_its_shape(view):
+    """Zoomed in on the upper end: in another layout it may lie outside of all that is seen."""
+    view.show_panels((FULL_SHAPE,))
+    camera = view.canvas.camera
+    camera.parallel_scale /= 6
+    shift = np.array([0.0, 0.0, 45.0])
+    camera.focal_point, camera.position = camera.focal_point + shift, camera.position + shift
+    camera.parallel_scale *= 0.9
+    camera.focal_point, camera.position = camera.focal_point + 2 * shift, camera.position + 2 * shift
+    view.show_panels((TEMPLATE, FULL_SHAPE))
+    QTest.qWait(30)
+    for panel in (TEMPLATE, FULL_SHAPE):
+        assert (pixels(view)[inside(view, panel)] != rgb(LIGHT.canvas)).any()
+
+
+def test_the_opening_view_can_be_had_again(view):
+    view.look_from("the front")
+    view.reset_camera()
+    QTest.qWait(30)
+    opening = pixels(view)
+    camera = view.canvas.camera
+    camera.roll += 40
+    camera.azimuth += 70
+    camera.parallel_scale /= 3
+    view.canvas.refresh()
+    QTest.qWait(30)
+    assert (pixels(view) != opening).any()
+    view.reset_camera()
+    QTest.qWait(30)
+    np.testing.assert_allclose(pixels(view).astype(int), opening, atol=3)
+
+
+def test_a_shape_that_grows_is_not_cut_along_the_words(view):
+    """It is drawn behind title and caption, up to the edge of its sub-plot."""
+    view.show_panels((FULL_SHAPE,))
+    view.canvas.camera.parallel_scale /= 2
+    view.canvas.refresh()
+    QTest.qWait(30)
+    rows, columns = inside(view, FULL_SHAPE)
+    seen = (pixels(view)[:, columns] != rgb(LIGHT.canvas)).any(axis=(1, 2))
+    assert seen[: rows.start].any() and seen[rows.stop :].any()
+
+
+def test_a_low_view_scrolls_from_row_to_row(view, card, qtbot):
+    view.resize(420, 295)
+    QTest.qWait(30)
+    (bar,) = view.findChildren(QScrollBar)
+    assert bar.isVisible()
+    seen = set()
+    for row in range(bar.maximum() + 1):
+        bar.setValue(row)
+        QTest.qWait(30)
+        shown = [panel for panel in panels_in(Layout.SIDE_BY_SIDE, card) if view.title(panel).isVisible()]
+        seen |= set(shown)
+        for panel in shown:
+            assert view.rect().contains(view.title(panel).geometry())
+            assert view.rect().contains(caption(view, panel).geometry())
+            assert (pixels(view)[inside(view, panel)] != rgb(LIGHT.canvas)).any()
+    assert seen == set(panels_in(Layout.SIDE_BY_SIDE, card))
+    view.resize(900, 600)
+    assert not bar.isVisible()
+
+
+def test_a_caption_is_wrapped_where_it_is_wider_than_its_sub_plot(view):
+    view.resize(5 * 152, 700)
+    view.set_caption(TEMPLATE, "25.3 cm³<br>mean distance 0.09 mm · 91 % beyond the scale", "")
+    label = caption(view, TEMPLATE)
+    assert label.heightForWidth(label.width()) <= label.height()
+    assert label.geometry().bottom() < view.height()
+
+
+def test_names_are_never_taken_for_markup(qtbot, card):
+    name = "<b>BMI</b> & percentile_for age and sex in per cent of the reference population"
+    odd = replace(card, covariates=(replace(card.covariates[0], name=name), *card.covariates[1:]))
+    view = sv.ShapeView()
+    qtbot.addWidget(view)
+    view.resize(500, 500)
+    view.show_atlas(odd, LIGHT)
+    panel = Panel("effect", name)
+    view.show_panels((panel, FULL_SHAPE))
+    view.show()
+    title = view.title(panel)
+    assert title.textFormat() is Qt.TextFormat.PlainText and "<b>BMI</b>" in title.text()
+    assert title.width() == 250
+    assert "&lt;b&gt;BMI" in title.toolTip() and "<b>" not in title.toolTip()
+    view.clear()
 
 
 def test_directions_are_anatomical(view):
