@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from corpus import meshes, tables
+from corpus import checkpoints, clouds, landmarks, meshes, options, settings, stores, tables, volumes, window
 from corpus.case import Case
 
-CASES: tuple[Case, ...] = (*meshes.CASES, *tables.CASES)
+KINDS = (
+    *(meshes, volumes, clouds, tables, landmarks),
+    *(checkpoints, stores, settings, options, window),
+)
+
+CASES: tuple[Case, ...] = tuple(case for kind in KINDS for case in kind.CASES)

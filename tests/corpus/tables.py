@@ -301,7 +301,7 @@ _TITLES = [
     ),
     *(_case(f"swapped blocks {turn}", GOOD, "either", least=0, without=range(8), damages=[damage.swap(9)]) for turn in "ab"),
     _case("a hole", GOOD, "either", least=0, without=range(8), damages=[damage.hole(20)]),
-    _case("zeros", GOOD, "refused", damages=[damage.zeros(20)]),
+    _case("zeros within", GOOD, "refused", damages=[damage.zeros(20)]),
     _case("twice", GOOD, "refused", damages=[damage.doubled]),
 ]
 
