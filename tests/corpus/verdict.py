@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from corpus.case import OUT
 from corpus.child import Report
+from corpus.counts import Ended
 from corpus.runner import MOST_MB, MOST_SECONDS, Outcome
 
 OURS = re.compile(r"naisr(-viewer)?: |rejected |warning |row \d+|  |- ")
@@ -14,10 +15,10 @@ OURS = re.compile(r"naisr(-viewer)?: |rejected |warning |row \d+|  |- ")
 
 BAR = re.compile(r"^[a-z ]+ ?\d*%?.*[━╸╺]")
 PYTHON = re.compile(
-    r"Traceback|NoneType|object has no attribute|index out of range|out of bounds for axis|could not broadcast"
-    r"|not enough values|too many values|unexpected keyword|'[a-z-]+' codec can't|invalid literal"
-    r"|could not convert string|buffer is smaller|unpack requires|cannot reshape|KeyError|TypeError|ValueError"
-    r"|0x[0-9a-f]{8,}|must be str|expected str instance|\b(int|float|str)\(\)"
+    r"Traceback|NoneType|object has no attribute|index out of range|out of bounds for axis|not enough values"
+    r"|could not broadcast|too many values|unexpected keyword|'[a-z-]+' codec can't|invalid literal"
+    r"|could not convert string|buffer is smaller|unpack requires|cannot reshape|KeyError|TypeError"
+    r"|ValueError|0x[0-9a-f]{8,}|must be str|expected str instance|\b(int|float|str)\(\)"
 )
 """What no sentence for people holds."""
 
@@ -33,6 +34,13 @@ def faults(outcome: Outcome) -> list[str]:
     if report.code is None:
         return [f"an exception came out: {report.trace[-1500:]}"]
     return [*_of_any(outcome, report), *(_of_success if report.code == 0 else _of_refusal)(outcome, report)]
+
+
+def ended(outcome: Outcome, found: Sequence[str]) -> Ended:
+    """How a case is counted."""
+    if found or outcome.report is None:
+        return "failed"
+    return "refused" if outcome.report.code else "success"
 
 
 def _of_any(outcome: Outcome, report: Report) -> Iterator[str]:

@@ -6,7 +6,6 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from corpus import checkpoints, clouds, meshes, volumes
@@ -99,35 +98,104 @@ def _dialogs_declined() -> Iterator[list[str]]:
 
 
 SCANS = (
-    *(f"mesh-{name}" for name in (
-        *("binary_stl", "binary_glb", "stl_cut_at_0.35", "vtk_cut_at_0.6", "vtp_cut_at_0.6", "glb_cut_at_0.35"),
-        *("text_vtk:_POINTS_2000000000_announced", "ply:_face_99999999999_announced", "vtp:_lines", "glb:_Draco"),
-        *("shape:_not_a_number", "shape:_1e300", "shape:_in_inches", "shape:_far_away", "shape:_debris_far_away"),
-        *("a_web_page_named_.stl", "zeros_named_.vtp", "a_folder_named_egg.stl", "a_pipe_named_egg.ply", "a_loop_named_egg.obj"),
-        *("stl_with_500_flips_a", "vtk_with_500_flips_a", "vtp_with_500_flips_a", "ply_with_500_flips_a", "shape:_the_upper_third"),
-    )),
-    *(f"volume-{name}" for name in (
-        *("nii_as_it_is", "nii:_two_labels", "nii.gz_cut_at_0.55", "nrrd_cut_at_0.55", "nii:_a_scan", "nii:_1500_labels"),
-        *("nii:_dimensions_(3,_30000,_30000,_30000)", "nrrd:_spacings_nan", "slicer:_layers", "a_zip_named_.nii.gz"),
-    )),
+    *(
+        f"mesh-{name}"
+        for name in (
+            *(
+                "binary_stl",
+                "binary_glb",
+                "stl_cut_at_0.35",
+                "vtk_cut_at_0.6",
+                "vtp_cut_at_0.6",
+                "glb_cut_at_0.35",
+            ),
+            *(
+                "text_vtk:_POINTS_2000000000_announced",
+                "ply:_face_99999999999_announced",
+                "vtp:_lines",
+                "glb:_Draco",
+            ),
+            *(
+                "shape:_not_a_number",
+                "shape:_1e300",
+                "shape:_in_inches",
+                "shape:_far_away",
+                "shape:_debris_far_away",
+            ),
+            *(
+                "a_web_page_named_.stl",
+                "zeros_named_.vtp",
+                "a_folder_named_egg.stl",
+                "a_pipe_named_egg.ply",
+                "a_loop_named_egg.obj",
+            ),
+            *(
+                "stl_with_500_flips_a",
+                "vtk_with_500_flips_a",
+                "vtp_with_500_flips_a",
+                "ply_with_500_flips_a",
+                "shape:_the_upper_third",
+            ),
+        )
+    ),
+    *(
+        f"volume-{name}"
+        for name in (
+            *(
+                "nii_as_it_is",
+                "nii:_two_labels",
+                "nii.gz_cut_at_0.55",
+                "nrrd_cut_at_0.55",
+                "nii:_a_scan",
+                "nii:_1500_labels",
+            ),
+            *(
+                "nii:_dimensions_(3,_30000,_30000,_30000)",
+                "nrrd:_spacings_nan",
+                "slicer:_layers",
+                "a_zip_named_.nii.gz",
+            ),
+        )
+    ),
     *(f"cloud-{name}" for name in ("commas,_csv", "two_numbers", "nan", "a_zip", "ten_points")),
-)  # fmt: skip
+)
 """Of the other kinds, what a window is shown as well."""
 
 ATLASES = (
-    *(f"checkpoint-{name}" for name in (
-        *("as_it_is,_info", "cut_at_0.5", "a_mesh", "a_zip", "a_table", "tensor_0:_nan,_mesh", "header:_version_abc"),
-        *("record:_a_scale_of_0", "record:_a_scale_of_nan", "record:_1000000000_wide", "record:_short_values"),
-        *("record:_a_covariate_of_scale_0", "record:_everybody_held_out", "record:_no_covariates", "a_folder,_info"),
-    )),
-)  # fmt: skip
+    *(
+        f"checkpoint-{name}"
+        for name in (
+            *(
+                "as_it_is,_info",
+                "cut_at_0.5",
+                "a_mesh",
+                "a_zip",
+                "a_table",
+                "tensor_0:_nan,_mesh",
+                "header:_version_abc",
+            ),
+            *(
+                "record:_a_scale_of_0",
+                "record:_a_scale_of_nan",
+                "record:_1000000000_wide",
+                "record:_short_values",
+            ),
+            *(
+                "record:_a_covariate_of_scale_0",
+                "record:_everybody_held_out",
+                "record:_no_covariates",
+                "a_folder,_info",
+            ),
+        )
+    ),
+)
 
 
 def _shown(case: Case, program: str) -> Case:
     """The files of a case in the window instead of under a command."""
     file = case.words[1] if program == "scan" else checkpoints.FILE
     ending = Expected(case.expected.ending) if case.expected.ending != "success" else Expected("success")
-    return Case("window", case.id, case.make, (file,), ending, program)  # type: ignore[arg-type]
+    return Case("window", case.id, case.make, (file,), ending, program)
 
 
 def _chosen() -> Iterator[Case]:
