@@ -194,7 +194,7 @@ _ROWS = [
     _row("nan", text({**_OWN, "top": (np.nan, 0.0, 0.0)})),
     _row("a name twice", text(_OWN) + b"top,0,0,0\n"),
     _row("two at the origin", text({**_OWN, "top": (0.0, 0.0, 0.0), "left": (0.0, 0.0, 0.0)})),
-    _row("another subject's", tables.marks(7)),
+    _row("another subject's", tables.marks(7), ""),
     _row("two landmarks", text({k: _OWN[k] for k in ("top", "left")})),
     _row("semicolons", text(_OWN, ";"), "8 shapes", "success"),
     _row("UTF-16", text(_OWN).decode().encode("utf-16"), "8 shapes", "success"),
