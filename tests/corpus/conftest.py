@@ -6,13 +6,17 @@ from pathlib import Path
 
 import pytest
 from corpus.counts import Counts, with_table
+from corpus.kinds import CASES
 
 COUNTS = pytest.StashKey[Counts]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
-        "--counts", type=Path, metavar="DOCUMENT", help="write how many cases ended how into a document"
+        "--counts",
+        type=Path,
+        metavar="DOCUMENT",
+        help="write how the cases ended into a document, if all were run",
     )
 
 
@@ -22,8 +26,9 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
     document = session.config.getoption("--counts", None)
-    if document is not None:
-        table = session.config.stash[COUNTS].markdown()
+    counts = session.config.stash[COUNTS]
+    if document is not None and counts.ended.total() == len(CASES):
+        table = counts.markdown()
         document.write_text(with_table(document.read_text(encoding="utf-8"), table), encoding="utf-8")
 
 
