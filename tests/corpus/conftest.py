@@ -16,7 +16,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--counts",
         type=Path,
         metavar="DOCUMENT",
-        help="write how the cases ended into a document, if all were run",
+        help="a document to count in how all cases ended",
     )
 
 
