@@ -249,7 +249,7 @@ _TENSORS = [
     _tensor(f"{value}", which, value, words)
     for which, value, words in (
         *((0, np.nan, MESH), (2, np.nan, MESH), (5, np.inf, MESH), (0, np.nan, FIT), (0, np.inf, INFO)),
-        *((-1, np.nan, MESH), (0, 1e38, MESH)),
+        *((-3, np.nan, MESH), (-3, 1e38, MESH)),
     )
 ]
 

@@ -172,7 +172,7 @@ _STORES = [
         _samples(name, change, which)
         for which in ALL
         for name, change in (
-            ("nan", lambda rows: rows * np.float32(np.nan)),
+            ("nan", lambda rows: np.full_like(rows, np.nan)),
             ("a column less", lambda rows: rows[:, :-1]),
             ("no rows", lambda rows: rows[:0]),
         )
@@ -185,7 +185,7 @@ _STORES = [
             ("words", lambda rows: rows.astype("U8")),
             ("one dimension", np.ravel),
             ("flat", lambda rows: rows[0]),
-            ("infinite", lambda rows: rows * np.float32(np.inf)),
+            ("infinite", lambda rows: np.full_like(rows, np.inf)),
             ("complex", lambda rows: rows.astype(complex)),
             ("a pickle", lambda rows: _rotten()),
             ("an archive", lambda rows: b"PK\x03\x04" + rows.tobytes()),
@@ -195,7 +195,7 @@ _STORES = [
     _samples("by columns", np.asfortranarray, ending="either"),
     _samples("big endian", lambda rows: rows.astype(">f4"), ending="either"),
     _samples("few rows", lambda rows: rows[:3], ending="either"),
-    _samples("nan in one shape", lambda rows: rows * np.float32(np.nan), every=False, ending="either"),
+    _samples("nan in one shape", lambda rows: np.full_like(rows, np.nan), every=False, ending="either"),
     _samples("a thousand times as far", lambda rows: rows * 1000, ending="either"),
     *(_bytes(f"cut at {share}", damage.cut(share), which="near.npy") for share in (0.03, 0.5, 0.99)),
     *(
@@ -229,7 +229,7 @@ _STORES = [
         {"mine": b"my notes"},
         words=("train", "store", "--out", "mine/a.safetensors", *OPTIONS, "1"),
     ),
-    _with("the training's folder is a file", {"mine.training": b"my notes"}, words=MORE),
+    _with("the training's folder is a file", {"mine.safetensors.training": b"my notes"}, words=MORE),
     _with(
         "a store that is a file",
         {"mine": b"my notes"},
@@ -248,11 +248,11 @@ def _state(
     """The state that a training goes on from, damaged."""
 
     def make(goods: Goods, rng: Generator) -> Files:
-        content = goods.training["mine.training/state.pt"]
+        content = goods.training["mine.safetensors.training/state.pt"]
         for each in damages:
             content = each(content, rng)
         training = {key: value for key, value in goods.training.items() if "tensorboard" not in key}
-        files = {**_files(goods), **training, "mine.training/state.pt": content, **(more or {})}
+        files = {**_files(goods), **training, "mine.safetensors.training/state.pt": content, **(more or {})}
         return {key: value for key, value in files.items() if value is not None}
 
     return Case("state", name, make, tuple(words), Expected(ending, trained))
@@ -312,12 +312,12 @@ _STATES = [
         )
         for value in (-5, "many", None, 2.5)
     ),
-    _state("a folder", more={"mine.training/state.pt": Special.FOLDER}),
+    _state("a folder", more={"mine.safetensors.training/state.pt": Special.FOLDER}),
     _state(
-        "what a killed program left", more={"mine.training/.state.abcd1234.pt": b"half"}, ending="success"
+        "what a killed program left", more={"mine.safetensors.training/.state.abcd1234.pt": b"half"}, ending="success"
     ),
     _state("without the atlas", more={"mine.safetensors": None}, ending="success"),
-    _state("without the state", more={"mine.training/state.pt": None}, ending="either"),
+    _state("without the state", more={"mine.safetensors.training/state.pt": None}, ending="either"),
     _state("another seed", words=(*MORE, "--seed", "5")),
     _state("another preset", words=(*MORE[:4], "--preset", "deepsdf-demo", "--epochs", "1")),
     _state("an atlas that is cut", more={"mine.safetensors": b"\x10\0\0\0\0\0\0\0{"}, ending="either"),

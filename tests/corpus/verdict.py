@@ -30,7 +30,7 @@ def faults(outcome: Outcome) -> list[str]:
     """What is wrong with how a case ended; empty where nothing is."""
     report = outcome.report
     if report is None:
-        return [f"the process {outcome.death}: {outcome.err[-1500:]}"]
+        return [f"the process {outcome.death}: {_last_words(outcome.err)}"]
     if report.code is None:
         return [f"an exception came out: {report.trace[-1500:]}"]
     return [*_of_any(outcome, report), *(_of_success if report.code == 0 else _of_refusal)(outcome, report)]
@@ -60,12 +60,26 @@ def _of_success(outcome: Outcome, report: Report) -> Iterator[str]:
     expected = outcome.case.expected
     if expected.ending == "refused":
         yield f"was accepted: {(report.out + report.err)[-600:]}"
-    if wrong := expected.check(outcome.folder):
+    if wrong := _wrong(outcome):
         yield f"{wrong}; it said: {(report.out + report.err)[-600:]}"
     if not re.search(expected.says, report.out + report.err):
         yield f"said nothing of '{expected.says}': {(report.out + report.err)[-600:]}"
     if changed := [name for name in _changed(outcome) if not _is_output(name)]:
         yield f"changed its input: {changed}"
+
+
+def _wrong(outcome: Outcome) -> str:
+    """What is wrong with the results."""
+    try:
+        return outcome.case.expected.check(outcome.folder)
+    except (OSError, ValueError, LookupError, AttributeError, TypeError) as error:
+        return f"the results cannot be read ({error!r})"
+
+
+def _last_words(err: str) -> str:
+    """Where a process was when it died, if it could say so."""
+    start = err.find("Fatal Python error")
+    return err[start : start + 2500] if start >= 0 else err[-1500:]
 
 
 def _of_refusal(outcome: Outcome, report: Report) -> Iterator[str]:

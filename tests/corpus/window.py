@@ -35,7 +35,6 @@ def opened(job: Job) -> int:
         window.show()
         controller.open(job.atlas)
         _rest(window, controller)
-        title = window.windowTitle()
         if window.error_text.text():
             raise RuntimeError(f"the atlas does not open: {window.error_text.text()}")
         if job.program == "atlas":
@@ -44,7 +43,8 @@ def opened(job: Job) -> int:
             window.scan_requested.emit(path)
         _rest(window, controller)
         message = window.error_text.text() or "; ".join(asked)
-        is_shown = bool(controller.state.patients) or window.windowTitle() != title
+        atlas = controller.state.atlas
+        is_shown = bool(controller.state.patients) or (atlas is not None and atlas.path == path)
         return _told(message, is_shown)
 
 
