@@ -183,7 +183,6 @@ _RECORDS = [
             ("frame", "scale_mm"),
             ("population", "covariates"),
             ("population", "values"),
-            ("preset", "model"),
         )
     ),
     *(
@@ -193,6 +192,7 @@ _RECORDS = [
     _record("a scale of 0, fit", _put("frame", "scale_mm", value=0), FIT),
     _record("a centre of two", _put("frame", "centre_mm", value=[0.0, 0.0])),
     _record("a centre of nan", _put("frame", "centre_mm", value=[float("nan"), 0.0, 0.0]), FIT),
+    _record("no model", _drop("preset", "model"), ending="either"),
     _record("another model", _put("preset", "model", value="magic")),
     _record("a model that is a list", _put("preset", "model", value=[])),
     *(

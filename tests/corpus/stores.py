@@ -314,7 +314,9 @@ _STATES = [
     ),
     _state("a folder", more={"mine.safetensors.training/state.pt": Special.FOLDER}),
     _state(
-        "what a killed program left", more={"mine.safetensors.training/.state.abcd1234.pt": b"half"}, ending="success"
+        "what a killed program left",
+        more={"mine.safetensors.training/.state.abcd1234.pt": b"half"},
+        ending="success",
     ),
     _state("without the atlas", more={"mine.safetensors": None}, ending="success"),
     _state("without the state", more={"mine.safetensors.training/state.pt": None}, ending="either"),
