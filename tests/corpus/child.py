@@ -61,8 +61,11 @@ def serve(connection: Connection, home: Path) -> None:
     os.environ |= {"OMP_NUM_THREADS": "1", "HOME": str(home), "XDG_CACHE_HOME": str(home / "cache")}
     # A process of its own says each warning once; this one has to say it of every case.
     warnings.simplefilter("always")
-    while (job := connection.recv()) is not None:
-        connection.send(_run(job, home))
+    try:
+        while (job := connection.recv()) is not None:
+            connection.send(_run(job, home))
+    except EOFError:
+        return  # whoever asked is gone
 
 
 def _run(job: Job, home: Path) -> Report:

@@ -147,7 +147,7 @@ class _Child:
             self._home.mkdir(parents=True, exist_ok=True)
             context = multiprocessing.get_context("spawn")
             self._connection, theirs = context.Pipe()
-            self._process = context.Process(target=serve, args=(theirs, self._home), daemon=True)
+            self._process = context.Process(target=serve, args=(theirs, self._home))
             self._process.start()
             theirs.close()
         return self._connection

@@ -13,7 +13,9 @@ from corpus.runner import MOST_MB, MOST_SECONDS, Outcome
 OURS = re.compile(r"naisr(-viewer)?: |rejected |warning |row \d+|  |- ")
 """How a line begins that the program itself says."""
 
-BAR = re.compile(r"^[a-z ]+ ?\d*%?.*[━╸╺]")
+BAR = re.compile(r"^[a-z ]+(:| \d+|)  ?.*(\d+ %|points/s|[━╸╺])")
+"""How far the work is, on a terminal and elsewhere."""
+
 PYTHON = re.compile(
     r"Traceback|NoneType|object has no attribute|index out of range|out of bounds for axis|not enough values"
     r"|could not broadcast|too many values|unexpected keyword|'[a-z-]+' codec can't|invalid literal"
