@@ -13,7 +13,7 @@ from corpus.runner import MOST_MB, MOST_SECONDS, Outcome
 OURS = re.compile(r"naisr(-viewer)?: |rejected |warning |row \d+|  |- ")
 """How a line begins that the program itself says."""
 
-BAR = re.compile(r"^[a-z ]+(:| \d+|)  ?.*(\d+ %|points/s|[━╸╺])")
+BAR = re.compile(r"^[a-z]+( [a-z0-9]+)?(: .*(\d+ %|points/s)| .*[━╸╺])")
 """How far the work is, on a terminal and elsewhere."""
 
 PYTHON = re.compile(
