@@ -6,7 +6,6 @@ import faulthandler
 import os
 import sys
 import tempfile
-import time
 import traceback
 import warnings
 from collections.abc import Iterator
@@ -45,7 +44,6 @@ class Report:
         out: standard output.
         err: standard error.
         peak_mb: most memory that the process held meanwhile.
-        seconds: that it took.
     """
 
     code: int | None
@@ -53,7 +51,6 @@ class Report:
     out: str
     err: str
     peak_mb: float
-    seconds: float
 
 
 def serve(connection: Connection, home: Path) -> None:
@@ -73,7 +70,7 @@ def _run(job: Job, home: Path) -> Report:
     os.environ["TMPDIR"] = str(job.scratch)
     tempfile.tempdir = None
     _forget_peak()
-    started, trace, code = time.monotonic(), "", None
+    trace, code = "", None
     with _captured(home) as told:
         faulthandler.enable(2)
         try:
@@ -81,7 +78,7 @@ def _run(job: Job, home: Path) -> Report:
         except BaseException:
             trace = traceback.format_exc()
     out, err = told
-    return Report(code, trace, out, err, _peak_mb(), time.monotonic() - started)
+    return Report(code, trace, out, err, _peak_mb())
 
 
 def _called(job: Job) -> int:

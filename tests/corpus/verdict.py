@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from corpus.case import OUT
 from corpus.child import Report
 from corpus.counts import Ended
-from corpus.runner import MOST_MB, MOST_SECONDS, Outcome
+from corpus.runner import MOST_MB, Outcome
 
 OURS = re.compile(r"naisr(-viewer)?: |rejected |warning |row \d+|  |- ")
 """How a line begins that the program itself says."""
@@ -48,8 +48,6 @@ def ended(outcome: Outcome, found: Sequence[str]) -> Ended:
 def _of_any(outcome: Outcome, report: Report) -> Iterator[str]:
     if report.peak_mb > MOST_MB:
         yield f"held {report.peak_mb:.0f} MB"
-    if report.seconds > MOST_SECONDS:
-        yield f"took {report.seconds:.0f} s"
     if outcome.scratch:
         yield f"left temporary files: {outcome.scratch}"
     if hidden := [name for name in _new(outcome) if "/." in f"/{name}" or name.endswith((".tmp", ".lock"))]:
