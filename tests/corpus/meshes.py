@@ -88,7 +88,9 @@ _STL = [
     _good("ASCII stl: no endsolid", "egg.stl", TEXT["stl"], damage.replaced(b"endsolid egg\n", b"")),
     _good("ASCII stl: lines of Windows", "egg.stl", TEXT["stl"], damage.replaced(b"\n", b"\r\n")),
     _good("ASCII stl: tabs", "egg.stl", TEXT["stl"], damage.replaced(b" ", b"\t")),
-    _good("ASCII stl: one long line", "egg.stl", TEXT["stl"], damage.replaced(b"\n", b" ")),
+    _mesh(
+        "ASCII stl: one long line", "egg.stl", TEXT["stl"], whole(EGG, "either"), damage.replaced(b"\n", b" ")
+    ),
     _good("ASCII stl: no name", "egg.stl", partial(shapes.stl_text, triangles(), name="")),
     _good(
         "ASCII stl: a name in Latin-1",
@@ -355,7 +357,7 @@ _GLB = [
         "glb: a long buffer",
         "egg.glb",
         BINARY["glb"],
-        REFUSED,
+        whole(EGG, "either"),
         damage.replaced(b'"byteLength": 23064', b'"byteLength": 93064'),
     ),
     _mesh("glb: bytes more", "egg.glb", BINARY["glb"], whole(EGG), damage.ended_with(bytes(8))),
@@ -464,7 +466,7 @@ _SHAPES = [
     _shape("no points", Shape(np.zeros((0, 3)), []), REFUSED),
     _shape("missing vertices", Shape(triangles().points[:600], triangles().polygons), REFUSED),
     _shape("negative vertices", Shape(triangles().points, [*triangles().polygons, [-5, 1, 2]]), REFUSED),
-    _shape("faces of two corners", Shape(triangles().points, [[0, 1], [1, 2], [2, 3]]), REFUSED),
+    _shape("faces of two corners", Shape(triangles().points, [[0, 1], [1, 2], [2, 3]]), part("either")),
     _shape("a thousand times as large", triangles().moved(1e6), REFUSED),
     _shape(
         "voxel indices",
