@@ -107,9 +107,9 @@ _BROKEN = [
             "1e308": "1,2,1e308",
             "an empty cell": "1,,3",
             "a NUL": "1,2,\x003",
-            "a point far away": "1,2,900000",
         }.items()
     ),
+    _cloud("a point far away", "egg.csv", lambda: _changed(5, "1,2,900000"), part("either", "far|away|from")),
     _cloud("a header without z", "egg.csv", lambda: text(header="x,y,w"), REFUSED),
     _cloud("x twice", "egg.csv", lambda: text(header="x,y,z,x", more=",99"), REFUSED),
     _cloud("two columns", "egg.csv", lambda: text(order="xy"), REFUSED),

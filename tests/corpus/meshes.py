@@ -210,7 +210,7 @@ _PLY = [
         for true, claim in (
             *((b"face 1280", "face 1281"), (b"face 1280", "face 99999999999"), (b"face 1280", "face -1")),
             *(
-                (b"vertex 642", "vertex 643"),
+                (b"vertex 642", "vertex 650"),
                 (b"vertex 642", "vertex 4000000000"),
                 (b"vertex 642", "vertex x"),
             ),
