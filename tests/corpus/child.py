@@ -58,6 +58,8 @@ def serve(connection: Connection, home: Path) -> None:
     os.environ |= {"OMP_NUM_THREADS": "1", "HOME": str(home), "XDG_CACHE_HOME": str(home / "cache")}
     # A process of its own says each warning once; this one has to say it of every case.
     warnings.simplefilter("always")
+    for unseen in (DeprecationWarning, PendingDeprecationWarning, ImportWarning, ResourceWarning):
+        warnings.simplefilter("ignore", unseen)
     try:
         while (job := connection.recv()) is not None:
             connection.send(_run(job, home))
