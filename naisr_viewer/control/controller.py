@@ -16,6 +16,7 @@ from naisr_viewer.control import jobs
 from naisr_viewer.control.preferences import Preferences
 from naisr_viewer.control.preparation import Preparation
 from naisr_viewer.control.refinement import Refinement
+from naisr_viewer.control.thrift import Thrift
 from naisr_viewer.control.worker import Worker
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.files.exports import in_the_way, planned
@@ -58,6 +59,7 @@ class Controller(QObject):
         self.state = ExplorerState()
         self.refinement = Refinement(window, engine, worker)
         self._preparation = Preparation(window, engine, self.refinement, background)
+        self._thrift = Thrift(self.refinement)
         self._window, self._engine, self._preferences = window, engine, preferences
         self._history = History()
         self._before_move: ExplorerState | None = None
@@ -192,6 +194,7 @@ class Controller(QObject):
     def shutdown(self) -> None:
         """Stop the workers and all timers; nothing happens afterwards."""
         self._preparation.close()
+        self._thrift.close()
         self.refinement.close()
 
     def _connect(self) -> None:
