@@ -18,6 +18,7 @@ from naisr_viewer.control.preferences import Preferences
 from naisr_viewer.control.preparation import Preparation
 from naisr_viewer.control.questions import Questions
 from naisr_viewer.control.refinement import Refinement
+from naisr_viewer.control.thrift import Thrift
 from naisr_viewer.control.timeline import Timeline
 from naisr_viewer.control.worker import Worker
 from naisr_viewer.engine.engine import Engine
@@ -67,6 +68,7 @@ class Controller(QObject):
         self.questions = Questions(window, preferences, is_attended)
         self.refinement = Refinement(window, engine, worker)
         self._preparation = Preparation(window, engine, self.refinement, background)
+        self._thrift = Thrift(self.refinement)
         self._window, self._engine, self._preferences = window, engine, preferences
         self._timeline = Timeline(engine)
         self._before_move: ExplorerState | None = None
@@ -218,6 +220,7 @@ class Controller(QObject):
     def shutdown(self) -> None:
         """Stop the workers and all timers; nothing happens afterwards."""
         self._preparation.close()
+        self._thrift.close()
         self.refinement.close()
 
     def _connect(self) -> None:

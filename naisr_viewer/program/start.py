@@ -71,6 +71,7 @@ def make_engine(device: str) -> Engine:
         InputError: when surfaces cannot be computed on ``device``.
     """
     leave_a_core_to_the_window()
+    remember_few_kernels()
     gc.set_threshold(50_000)  # imports make many objects that stay: seldom worth looking through
     require_device(device)
     return Engine(partial(load_atlas, device=device))
@@ -84,6 +85,15 @@ def leave_a_core_to_the_window() -> None:
     """
     os.environ.setdefault("OMP_NUM_THREADS", str(max(1, (os.cpu_count() or 2) - 1)))
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+
+
+def remember_few_kernels() -> None:
+    """Bound what torch keeps of the machine code it makes for each size of a product, unless the user has.
+
+    Bands of surfaces have ever different sizes: the thousand that it would remember take some 250 MB and are
+    seldom met again.
+    """
+    os.environ.setdefault("ONEDNN_PRIMITIVE_CACHE_CAPACITY", "64")
 
 
 def make_window(
