@@ -18,7 +18,17 @@ ROOT = Path(__file__).parents[1]
 FLOORS = {
     "naisr_model": (
         ("__init__",),
-        ("errors", "files", "shipped", "covariates", "frames", "config", "progress", "capabilities"),
+        (
+            "errors",
+            "files",
+            "exports",
+            "shipped",
+            "covariates",
+            "frames",
+            "config",
+            "progress",
+            "capabilities",
+        ),
         ("work",),
         ("data",),
         ("models",),
@@ -61,7 +71,7 @@ class Rule:
 
 COVARIATES = "naisr_model.covariates"
 VOCABULARY = (COVARIATES, "naisr_model.capabilities")
-LIGHT = tuple(f"naisr_model.{name}" for name in ("errors", "files", "progress", "shipped"))
+LIGHT = tuple(f"naisr_model.{name}" for name in ("errors", "exports", "files", "progress", "shipped"))
 """What anybody may use."""
 
 CANVAS = "naisr_viewer.views.shapes.canvas"

@@ -88,7 +88,9 @@ def mesh(
     extrapolate: bool = False,
     device: str = "cpu",
 ) -> None:
-    """Write one surface of an atlas in millimetres (STL, PLY, OBJ or GLB by the file's name).
+    """Write one surface of an atlas (STL, PLY, OBJ, VTP or GLB by the file's name).
+
+    Coordinates are millimetres with z up; in GLB metres with y up, as that format says.
 
     Args:
         atlas: the .safetensors file.
@@ -102,9 +104,11 @@ def mesh(
     """
     from naisr_model.atlas import Atlas
     from naisr_model.covariates import require_known
+    from naisr_model.exports import FORMATS, mesh_bytes
 
-    if out.suffix.lower() not in (".stl", ".ply", ".obj", ".glb"):
-        raise InputError(f"cannot write '{out.suffix}'; name the file .stl, .ply, .obj or .glb")
+    ending = next((each for each in FORMATS if out.suffix.lower() == f".{each}"), None)
+    if ending is None:
+        raise InputError(f"cannot write '{out.suffix}'; name the file .stl, .ply, .obj, .vtp or .glb")
     if template and (effect is not None or set):
         raise InputError("the template depends on no covariate; leave out --effect and --set")
     loaded = Atlas.load(atlas, device)
@@ -127,5 +131,5 @@ def mesh(
     if not len(surface.faces):
         raise InputError("there is no surface at these covariates; choose values nearer to the data")
     with replacing(out) as temporary:
-        surface.export(temporary)
+        temporary.write_bytes(mesh_bytes(surface, ending))
     print(f"{out}: {len(surface.faces)} faces, {surface.volume / 1000:.2f} cm³")

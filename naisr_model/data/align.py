@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from naisr_model.data.patients import rim
+from naisr_model.data.meshes import rim
 from naisr_model.errors import InputError
 from naisr_model.progress import SILENT, Progress
 

@@ -1,25 +1,23 @@
 """One patient's shape: reading it from any file, finding what is wrong with it, and setting that right.
 
-:func:`read_patient`, then :func:`repaired`, which also says what it did and what is left.
+:func:`read_patient`, then :func:`repaired`, whose result remembers what was done; :func:`check_patient` says
+what is left.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Container, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
-import igl
 import numpy as np
 import trimesh
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from naisr_model.data import meshes, volumes
-from naisr_model.data.remarks import Remark
+from naisr_model.data import formats, meshes, volumes
+from naisr_model.data.remarks import Remark, gravest_first
 from naisr_model.errors import InputError
 from naisr_model.frames import BOX_MARGIN, Frame
 
@@ -31,7 +29,7 @@ MOST_FACES = 500_000
 
 FEWEST_POINTS = 50
 
-UNITS_MM = {"metres": 1000.0, "centimetres": 10.0, "inches": 25.4, "micrometres": 0.001}
+UNITS_MM = {"millimetres": 1.0, "metres": 1000.0, "centimetres": 10.0, "inches": 25.4, "micrometres": 0.001}
 PLAUSIBLE_SIZE = (0.15, 1.3)
 """Longest side of a shape over that of the population's largest: from a newborn, or a piece, up."""
 
@@ -48,9 +46,10 @@ class PatientShape:
             in the file.
         source: what was read, for example ``p01.nii.gz, label 2 'airway'``.
         space: ``LPS`` or ``RAS`` where the file says it, else empty.
-        remarks: what was odd about the file.
+        remarks: what was odd about the file, and what was repaired.
         from_file: 4x4, coordinates as they were read to those of ``mesh_mm``, by every repair and
             motion since; landmarks of the file go the same way.
+        unit_mm: how long a unit of the file is.
         units_known: whether a person said how long a unit is, so that it is not guessed.
     """
 
@@ -59,6 +58,7 @@ class PatientShape:
     space: Literal["LPS", "RAS", ""] = ""
     remarks: tuple[Remark, ...] = ()
     from_file: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
+    unit_mm: float = 1.0
     units_known: bool = False
 
     @property
@@ -69,31 +69,12 @@ class PatientShape:
     @property
     def is_closed(self) -> bool:
         """Whether the surface bounds a body, so that its volume means something."""
-        return not self.is_cloud and not len(rim(self.mesh_mm))
+        return meshes.is_closed(self.mesh_mm)
 
     @property
     def volume_cm3(self) -> float | None:
         """What the surface encloses; None where it is open or a cloud of points."""
         return float(self.mesh_mm.volume) / 1000 if self.is_closed else None
-
-
-@dataclass(frozen=True)
-class Finding:
-    """Something about a patient that a fit would suffer from.
-
-    Attributes:
-        kind: an ``error`` makes a fit meaningless, a ``warning`` is to be known.
-        topic: one word for the kind of trouble, such as ``units``.
-        sentence: what is the matter.
-        remedy: what to do.
-        repair: does it, where the program can; None where a person must.
-    """
-
-    kind: Literal["error", "warning"]
-    topic: str
-    sentence: str
-    remedy: str
-    repair: Callable[[PatientShape], PatientShape] | None = field(default=None, compare=False, repr=False)
 
 
 # --- reading ------------------------------------------------------------------------------------
@@ -110,34 +91,35 @@ def read_patient(path: str | Path, label: int | str | None = None) -> PatientSha
     Raises:
         InputError: when the file cannot be used, or a volume has several labels and none is chosen.
     """
-    path = Path(path)
+    path = formats.check_path(path)
     if volumes.is_label_volume(path):
         return _from_labels(path, label)
     if label is not None:
         raise InputError(f"{path.name} is no label volume, so label {label} cannot be chosen; leave it out")
-    if path.suffix.lower() in POINT_ENDINGS:
+    if path.suffix.lower() in POINT_ENDINGS and not _holds_mesh(path):
         points = read_points(path)
         return PatientShape(_cloud(points), f"{path.name}, {len(points):,} points")
     return _from_mesh(path)
 
 
+def _holds_mesh(path: Path) -> bool:
+    """Whether a file that is called a text of points is a mesh all the same."""
+    return bool(formats.format_of(formats.plain(formats.content_of(path)), path.suffix.lower()[1:]))
+
+
 def _from_mesh(path: Path) -> PatientShape:
-    if path.suffix.lower() not in meshes.READERS:
-        known = sorted(meshes.READERS | POINT_ENDINGS | set(volumes.ENDINGS))
-        raise InputError(f"{path.name} is not one of {', '.join(known)}; convert it first")
-    mesh = meshes.read_mesh_or_points(path)
+    file = meshes.read_file(path, {*POINT_ENDINGS, *volumes.ENDINGS})
+    mesh, remarks = file.mesh_mm, file.remarks
     kind = f"{len(mesh.faces):,} faces" if len(mesh.faces) else f"{len(mesh.vertices):,} points"
-    # Beyond that, cleaning takes a minute, and decimation cleans as well.
+    # Beyond that, mending takes a minute, and decimation cleans as well.
     if 0 < len(mesh.faces) <= MOST_FACES:
-        mesh = meshes.cleaned(mesh)
-    return PatientShape(mesh, f"{path.name}, {kind}", _stated_space(path))
-
-
-def _stated_space(path: Path) -> Literal["LPS", "RAS", ""]:
-    """What 3D Slicer writes at the start of a mesh file."""
-    with path.open("rb") as file:
-        start = file.read(1024)
-    return "RAS" if b"SPACE=RAS" in start else "LPS" if b"SPACE=LPS" in start else ""
+        try:
+            mesh, mended = meshes.mended_mesh(mesh)
+        except InputError as error:
+            raise InputError(f"{path.name}: {error}") from error
+        remarks = (*remarks, *mended)
+    unit_mm = float(np.linalg.norm(file.from_file[:3, 0]))
+    return PatientShape(mesh, f"{path.name}, {kind}", file.space, remarks, file.from_file, unit_mm)
 
 
 def _cloud(points: NDArray[np.float64]) -> trimesh.Trimesh:
@@ -163,10 +145,13 @@ def read_points(path: str | Path) -> NDArray[np.float64]:
         InputError: when the file is missing, is no such text or has a coordinate that is not finite.
     """
     path = Path(path)
+    content = formats.plain(formats.content_of(path))
+    if what := formats.foreign(content):
+        raise InputError(f"{path.name} is {what[0]}; {what[1]}")
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path.name} cannot be read ({error}); give a text file of points") from error
+        text = content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path.name} is no text ({error}); give a text file of points") from error
     lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
     if not lines:
         raise InputError(f"{path.name} is empty; give a line x,y,z for each point")
@@ -203,8 +188,16 @@ def _is_number(text: str) -> bool:
 # --- checking -----------------------------------------------------------------------------------
 
 
-def check_patient(patient: PatientShape, frame: Frame) -> tuple[Finding, ...]:
-    """Find what would spoil a fit, errors first.
+class _Fault(NamedTuple):
+    """A remark, what would set the matter right, and what is said once that is done."""
+
+    remark: Remark
+    repair: Callable[[PatientShape], PatientShape] | None = None
+    done: str = ""
+
+
+def check_patient(patient: PatientShape, frame: Frame) -> tuple[Remark, ...]:
+    """Find what would spoil a fit, what forbids one first.
 
     The position is judged too, so a scan is checked again after it was aligned.
 
@@ -212,49 +205,57 @@ def check_patient(patient: PatientShape, frame: Frame) -> tuple[Finding, ...]:
         patient: what was read.
         frame: that of the atlas; its box tells where the population's shapes lie and how large they are.
     """
+    return gravest_first(fault.remark for fault in _faults(patient, frame))
+
+
+def repaired(patient: PatientShape, frame: Frame) -> PatientShape:
+    """Set right what forbids a fit, where the program can; the result's remarks tell what was done."""
+    done: set[str] = set()
+    while fault := next(_mendable(patient, frame, done), None):
+        assert fault.repair is not None
+        told = Remark("fine", fault.remark.topic, fault.done)
+        patient = fault.repair(patient)
+        patient = replace(patient, remarks=(*patient.remarks, told))
+        done.add(told.topic)
+    return patient
+
+
+def _mendable(patient: PatientShape, frame: Frame, done: Container[str]) -> Iterator[_Fault]:
+    for fault in _faults(patient, frame):
+        if fault.remark.severity == "refuse" and fault.repair and fault.remark.topic not in done:
+            yield fault
+
+
+def _faults(patient: PatientShape, frame: Frame) -> list[_Fault]:
     if fatal := _unusable(patient):
-        return (fatal,)
-    units = _units(patient, frame)
-    position = None if units and units.kind == "error" else _position(patient, frame)
-    found = [units, position, _voxel_indices(patient), _space(patient)]
+        return [_Fault(fatal)]
+    far = meshes.far_points(patient.mesh_mm)
+    main_mm = np.asarray(patient.mesh_mm.vertices, np.float64)[~far]
+    units = _units(patient, main_mm, frame)
+    position = None if units and units.remark.severity == "refuse" else _position(main_mm, frame)
+    found = [units, *map(_unmended, (position, _voxel_indices(patient), _space(patient)))]
+    found.append(_unmended(meshes.debris(patient.mesh_mm, far)))
     if len(patient.mesh_mm.faces) > MOST_FACES:
         found.append(_too_fine(patient))
     elif not patient.is_cloud:
-        found += [_inverted(patient), _components(patient), _opening(patient)]
-    return tuple(sorted((finding for finding in found if finding), key=lambda finding: finding.kind))
+        seen = (meshes.components(patient.mesh_mm), meshes.spikes(patient.mesh_mm), _opening(patient))
+        found += [_inverted(patient), *map(_unmended, seen)]
+    return [fault for fault in found if fault]
 
 
-def repaired(
-    patient: PatientShape, frame: Frame
-) -> tuple[PatientShape, tuple[Finding, ...], tuple[Finding, ...]]:
-    """Repair the errors that the program can repair.
-
-    Returns:
-        The patient; what was found and repaired; what is still the matter.
-    """
-    done: list[Finding] = []
-    left = check_patient(patient, frame)
-    while fixable := [f for f in left if f.kind == "error" and f.repair and f.topic not in _topics(done)]:
-        assert fixable[0].repair is not None
-        patient = fixable[0].repair(patient)
-        done.append(fixable[0])
-        left = check_patient(patient, frame)
-    return patient, tuple(done), left
+def _unmended(remark: Remark | None) -> _Fault | None:
+    return None if remark is None else _Fault(remark)
 
 
-def _topics(findings: list[Finding]) -> set[str]:
-    return {finding.topic for finding in findings}
-
-
-def _unusable(patient: PatientShape) -> Finding | None:
+def _unusable(patient: PatientShape) -> Remark | None:
     points = np.asarray(patient.mesh_mm.vertices)
     if len(points) < FEWEST_POINTS:
         sentence = f"the shape has only {len(points)} points" if len(points) else "the shape is empty"
-        return Finding("error", "empty", sentence, "export the surface again")
+        return Remark("refuse", "empty", sentence, "export the surface again")
     if not np.isfinite(points).all():
-        return Finding("error", "numbers", "some coordinates are not finite numbers", "export it again")
+        return Remark("refuse", "numbers", "some coordinates are not finite numbers", "export it again")
     if _is_flat(patient):
-        return Finding("error", "flat", "the shape is flat and bounds no body", "check how it was exported")
+        return Remark("refuse", "flat", "the shape is flat and bounds no body", "check how it was exported")
     return None
 
 
@@ -269,67 +270,87 @@ def _is_flat(patient: PatientShape) -> bool:
     return volume < meshes.FLAT_SHARE * area**1.5 / (6 * np.sqrt(np.pi))
 
 
-def _units(patient: PatientShape, frame: Frame) -> Finding | None:
+def _units(patient: PatientShape, main_mm: NDArray[np.float64], frame: Frame) -> _Fault | None:
+    """Judged by the points of the main piece."""
     largest_mm = 2 * frame.scale_mm / BOX_MARGIN
-    longest = float(np.ptp(patient.mesh_mm.vertices, axis=0).max())
+    longest = float(np.ptp(main_mm, axis=0).max())
     low, high = PLAUSIBLE_SIZE
     if low <= longest / largest_mm <= high:
         return None
     sentence = f"the shape is {longest:.3g} mm long, the atlas's shapes are up to {largest_mm:.0f} mm"
-    for unit, factor in () if patient.units_known else UNITS_MM.items():
-        if low <= longest * factor / largest_mm <= high:
-            guess = f"{sentence}, so its numbers look like {unit}"
-            return Finding("error", "units", guess, f"scale it by {factor:g}", partial(scaled, factor=factor))
+    units = {} if patient.units_known else UNITS_MM
+    fits = {
+        unit: mm for unit, mm in units.items() if low <= longest * mm / patient.unit_mm / largest_mm <= high
+    }
+    if fits:
+        return _guessed(fits, sentence, patient.unit_mm)
     # Of known units, a short shape may be a small part; nothing makes a long one right.
     part = patient.units_known and longest < low * largest_mm
-    remedy = "scale it to millimetres, or check that it is this anatomy"
-    return Finding("warning" if part else "error", "units", sentence, remedy)
+    remedy = "scale it to millimetres (--scale), or check that it is this anatomy"
+    return _Fault(Remark("look" if part else "refuse", "units", sentence, remedy))
 
 
-def _voxel_indices(patient: PatientShape) -> Finding | None:
+def _guessed(fits: Mapping[str, float], sentence: str, unit_mm: float) -> _Fault:
+    """One unit that explains the size is taken; among several a person has to choose."""
+    guess = f"{sentence}, so its numbers look like {' or '.join(fits)}"
+    if len(fits) > 1:
+        choices = " or ".join(f"--scale {mm:g} for {unit}" for unit, mm in fits.items())
+        return _Fault(Remark("refuse", "units", guess, f"say which they are: {choices}"))
+    (mm,) = fits.values()
+    done = f"{guess}: it was scaled by {mm / unit_mm:g}"
+    return _Fault(
+        Remark("refuse", "units", guess, f"scale it by {mm / unit_mm:g}"),
+        partial(scaled, factor=mm / unit_mm),
+        done,
+    )
+
+
+def _voxel_indices(patient: PatientShape) -> Remark | None:
     doubled = 2 * np.asarray(patient.mesh_mm.vertices)
     if np.abs(doubled - np.round(doubled)).max() > 1e-6:
         return None
     sentence = "all coordinates are whole or half numbers, so they look like voxel indices"
-    return Finding("warning", "voxels", sentence, "scale it by the voxel size in mm if they are")
+    return Remark("look", "voxels", sentence, "if they are, give the voxel size in mm (--scale)")
 
 
-def _position(patient: PatientShape, frame: Frame) -> Finding | None:
-    points = frame.to_model(patient.mesh_mm.vertices)
+def _position(main_mm: NDArray[np.float64], frame: Frame) -> Remark | None:
+    points = frame.to_model(main_mm)
     centre = (points.min(axis=0) + points.max(axis=0)) / 2
     remedy = "align it to the atlas (icp or landmarks)"
     if np.abs(centre).max() > 1:
         away_mm = float(np.linalg.norm(centre)) * frame.scale_mm
         sentence = f"the shape lies {away_mm:.0f} mm from the middle of the atlas, outside its box"
-        return Finding("error", "far", sentence, remedy)
+        return Remark("refuse", "far", sentence, remedy)
     outside = float((np.abs(points).max(axis=1) > 1).mean())
     if not outside:
         return None
-    return Finding(
-        "warning", "outside", f"{100 * outside:.0f} % of the shape lies outside the atlas's box", remedy
+    return Remark(
+        "look", "outside", f"{100 * outside:.0f} % of the shape lies outside the atlas's box", remedy
     )
 
 
-def _space(patient: PatientShape) -> Finding | None:
+def _space(patient: PatientShape) -> Remark | None:
     if patient.space != "RAS":
         return None
     sentence = "the file says that its coordinates are RAS, while label volumes are read as LPS"
-    remedy = "turn it by half about z if the atlas was made from LPS"
-    return Finding("warning", "space", sentence, remedy, ras_to_lps)
+    return Remark("look", "space", sentence, "if it lies turned by half about z, align it (icp or landmarks)")
 
 
-def _too_fine(patient: PatientShape) -> Finding:
+def _too_fine(patient: PatientShape) -> _Fault:
     sentence = f"the surface has {len(patient.mesh_mm.faces):,} faces, more than a fit can use"
-    return Finding("error", "fine", sentence, f"decimate it to about {MOST_FACES // 2:,}", decimated)
+    few = f"{MOST_FACES // 2:,}"
+    remark = Remark("refuse", "fine", sentence, f"thin it to about {few}")
+    return _Fault(remark, _thinned, f"{sentence}: it was thinned to about {few}")
 
 
-def _inverted(patient: PatientShape) -> Finding | None:
+def _inverted(patient: PatientShape) -> _Fault | None:
     turned = _outward(patient.mesh_mm)
     share = float((np.asarray(turned.faces) != patient.mesh_mm.faces).any(axis=1).mean())
     if not share:
         return None
-    sentence = f"{100 * share:.0f} % of the faces look inward, so the volume is wrong or negative"
-    return Finding("error", "inverted", sentence, "turn them round", flipped)
+    looked = f"{100 * share:.0f} % of the faces look inward, so the volume is wrong or negative"
+    remark = Remark("refuse", "inverted", looked, "turn them round")
+    return _Fault(remark, flipped, f"{100 * share:.0f} % of the faces looked inward: they were turned round")
 
 
 def _outward(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
@@ -346,55 +367,12 @@ def _volume_from_middle(mesh: trimesh.Trimesh) -> float:
     return float(np.einsum("ij,ij", heights, mesh.triangles_cross)) / 6
 
 
-def _components(patient: PatientShape) -> Finding | None:
-    areas = _component_areas(patient.mesh_mm)[1]
-    if len(areas) < 2:
-        return None
-    largest = areas.max() / areas.sum()
-    sentence = f"the surface has {len(areas)} components; the largest has {100 * largest:.1f} % of the area"
-    remedy = "keep the largest, or go on if they all belong to the shape"
-    return Finding("warning", "components", sentence, remedy, largest_component)
-
-
-def _component_areas(mesh: trimesh.Trimesh) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    component = np.asarray(igl.facet_components(np.asarray(mesh.faces, np.int64))[1])
-    return component, np.bincount(component, weights=mesh.area_faces).astype(np.float64)
-
-
-def _opening(patient: PatientShape) -> Finding | None:
-    holes = hole_areas_mm2(patient.mesh_mm)
-    if not len(holes):
-        return None
-    share = holes.sum() / (holes.sum() + patient.mesh_mm.area)
-    count = "a hole" if len(holes) == 1 else f"{len(holes)} holes"
-    sentence = f"the surface is open: {count} of {100 * share:.1f} % of its area"
+def _opening(patient: PatientShape) -> Remark | None:
+    remark = meshes.opening(patient.mesh_mm)
+    if remark is None or remark.severity == "fine":
+        return remark
     remedy = "close it if the shape is whole; else it is fitted as a part, and the volume is the model's"
-    return Finding("warning", "open", sentence, remedy)
-
-
-def hole_areas_mm2(mesh_mm: trimesh.Trimesh) -> NDArray[np.float64]:
-    """Area of each hole of a surface whose faces are wound alike, ``[holes]``.
-
-    The area vector of a rim is the sum of p x q / 2 over its directed edges.
-    """
-    edges, points = rim(mesh_mm), np.asarray(mesh_mm.vertices)
-    if not len(edges):
-        return np.zeros(0)
-    graph = coo_array((np.ones(len(edges)), edges.T), (len(points), len(points)))
-    hole = connected_components(graph)[1][edges[:, 0]]
-    points = points - points[edges].mean(axis=(0, 1))
-    vectors = np.cross(points[edges[:, 0]], points[edges[:, 1]]) / 2
-    areas = np.linalg.norm([np.bincount(hole, weights=column) for column in vectors.T], axis=0)
-    return areas[np.unique(hole)]
-
-
-def rim(mesh: trimesh.Trimesh) -> NDArray[np.int64]:
-    """The edge of an open surface: directed edges that no neighbour runs along the other way, ``[n, 2]``."""
-    edges = np.asarray(mesh.faces, np.int64)[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    keys = edges.min(axis=1) * len(mesh.vertices) + edges.max(axis=1)
-    _, index = np.unique(keys, return_inverse=True)
-    surplus = np.bincount(index, weights=np.where(edges[:, 0] < edges[:, 1], 1, -1))
-    return edges[surplus[index] != 0]
+    return replace(remark, remedy=remedy)
 
 
 # --- repairing ----------------------------------------------------------------------------------
@@ -424,7 +402,7 @@ def flipped(patient: PatientShape) -> PatientShape:
 
 def largest_component(patient: PatientShape) -> PatientShape:
     """The component with the largest area alone; cavities, which are components too, are filled."""
-    component, areas = _component_areas(patient.mesh_mm)
+    component, areas = meshes.component_areas(patient.mesh_mm)
     mesh = patient.mesh_mm.copy()
     mesh.update_faces(component == areas.argmax())
     mesh.remove_unreferenced_vertices()
@@ -450,17 +428,28 @@ def decimated(patient: PatientShape, faces: int = MOST_FACES // 2) -> PatientSha
     coarse = pyvista.wrap(binning.GetOutput())
     vertices, triangles = np.asarray(coarse.points, np.float64), np.asarray(coarse.regular_faces, np.int64)
     unfolded = trimesh.Trimesh(vertices, _without_folds(triangles), process=False)
-    return replace(patient, mesh_mm=meshes.cleaned(unfolded))
+    unfolded.remove_unreferenced_vertices()
+    return replace(patient, mesh_mm=unfolded)
+
+
+def _thinned(patient: PatientShape) -> PatientShape:
+    """Decimated, and mended as smaller surfaces are when they are read."""
+    thin = decimated(patient)
+    mesh, mended = meshes.mended_mesh(thin.mesh_mm)
+    return replace(thin, mesh_mm=mesh, remarks=(*thin.remarks, *mended))
 
 
 def _without_folds(faces: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Leave out each pair of faces that share their corners and look opposite ways."""
+    """Leave out each pair of faces that share their corners and look opposite ways.
+
+    What looks one way twice stays twice, or the surface would be open there.
+    """
     order = np.argsort(faces, axis=1)
     turns = np.where(np.linalg.det(np.eye(3)[order]) > 0, 1, -1)
     corners, index = np.unique(np.take_along_axis(faces, order, axis=1), axis=0, return_inverse=True)
-    net = np.bincount(index.ravel(), weights=turns).round()
-    kept = corners[net != 0]
-    return np.where((net[net != 0] > 0)[:, None], kept, kept[:, ::-1])
+    net = np.bincount(index.ravel(), weights=turns).round().astype(np.int64)
+    facing = np.where((net > 0)[:, None], corners, corners[:, ::-1])
+    return np.repeat(facing, np.abs(net), axis=0)
 
 
 def _area_mm2(mesh: trimesh.Trimesh) -> float:

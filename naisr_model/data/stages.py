@@ -58,8 +58,8 @@ def load(path: Path) -> tuple[trimesh.Trimesh, tuple[str, ...]]:
     Raises:
         InputError: when it cannot be used.
     """
-    mesh = meshes.repair_mesh(meshes.read_mesh(path))
-    return mesh, meshes.check_mesh(mesh)
+    file = meshes.sound_mesh(path)
+    return file.mesh_mm, tuple(remark.text for remark in file.remarks)
 
 
 def inspect(job: tuple[TableRow, str]) -> Look:

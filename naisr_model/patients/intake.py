@@ -1,14 +1,14 @@
 """A patient's file brought into the frame of an atlas: read, repaired, aligned and checked.
 
 :func:`take_in` does all of it; a window goes step by step: :func:`labels` says what there is to choose from,
-:func:`read` gives an :class:`Intake` with its sentences and findings, :func:`aligned` moves it and shows the
+:func:`read` gives an :class:`Intake` with its sentences and remarks, :func:`aligned` moves it and shows the
 proposal, and what ``is_ready`` can be fitted.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,6 @@ from naisr_model.covariates import Values
 from naisr_model.data import volumes
 from naisr_model.data.align import Landmarks, Method, Proposal, propose, read_landmarks
 from naisr_model.data.patients import (
-    Finding,
     PatientShape,
     check_patient,
     moved,
@@ -28,6 +27,7 @@ from naisr_model.data.patients import (
     repaired,
     scaled,
 )
+from naisr_model.data.remarks import Remark, gravest_first
 from naisr_model.errors import InputError
 from naisr_model.progress import SILENT, Progress
 
@@ -37,34 +37,31 @@ class Intake:
     """A patient's shape on its way to a fit, and what was done so far.
 
     Attributes:
-        patient: as it lies now, in the frame of the atlas once nothing in ``findings`` is an error.
+        patient: as it lies now, in the frame of the atlas once nothing in ``found`` refuses it.
             An open surface or a cloud of points (``not patient.is_closed``) is fitted as a part: it has
             no volume of its own, says nothing of inside and outside, and is aligned by its own points
             alone, so that an alignment of it deserves a closer look.
-        repairs: what was wrong with the file and was set right, a sentence each.
-        findings: what is still the matter, errors first; the only error among them is to lie far from
-            the atlas, which an alignment mends.
+        found: what is the matter as it lies, gravest first; all that refuses it is to lie far from the atlas,
+            which an alignment mends, or a unit that a person has to choose.
         method: of the alignment: none, icp or landmarks.
         proposal: the motion that was made; None without alignment.
     """
 
     patient: PatientShape
-    repairs: tuple[str, ...]
-    findings: tuple[Finding, ...]
+    found: tuple[Remark, ...]
     method: Method = "none"
     proposal: Proposal | None = None
 
     @property
-    def remarks(self) -> tuple[str, ...]:
-        """What is odd and was left, a sentence each."""
-        found = (f"{finding.sentence}; {finding.remedy}" for finding in self.findings)
+    def remarks(self) -> tuple[Remark, ...]:
+        """What is odd about the file, what was repaired and what is left, gravest first."""
         doubt = () if self.proposal is None else _doubt(self.proposal)
-        return (*(remark.text for remark in self.patient.remarks), *doubt, *found)
+        return gravest_first((*self.patient.remarks, *doubt, *self.found))
 
     @property
     def is_ready(self) -> bool:
         """Whether a fit makes sense."""
-        return all(finding.kind != "error" for finding in self.findings)
+        return all(remark.severity != "refuse" for remark in self.found)
 
     @property
     def alignment(self) -> str:
@@ -73,19 +70,19 @@ class Intake:
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """All of it for people, in the order in which it was done."""
+        """All of it for people: what was read, the remarks and how grave they are, alignment, volume."""
         aligned = (self.alignment,) if self.alignment else ()
         volume_cm3 = self.patient.volume_cm3
         measured = () if volume_cm3 is None else (f"its own volume is {volume_cm3:.2f} cm³",)
-        return (f"read {self.patient.source}", *self.repairs, *aligned, *self.remarks, *measured)
+        remarks = (f"{remark.severity}: {remark.text}" for remark in self.remarks)
+        return (f"read {self.patient.source}", *remarks, *aligned, *measured)
 
     def to_json(self) -> dict[str, Any]:
         """The same for programs; the matrix leads from the file's coordinates to the atlas frame."""
         return {
             "source": self.patient.source,
             "volume_cm3": self.patient.volume_cm3,
-            "repairs": list(self.repairs),
-            "remarks": list(self.remarks),
+            "remarks": [remark.to_json() for remark in self.remarks],
             "alignment": None if self.proposal is None else _distances(self.method, self.proposal),
             "file_to_atlas": self.patient.from_file.tolist(),
         }
@@ -119,7 +116,7 @@ def take_in(
         Cancelled: when nobody waits any more.
     """
     intake = aligned(read(path, atlas, label, scale), atlas, known, align, landmarks, progress)
-    _stop_at_errors(path, intake.findings)
+    _refuse(path.name, intake.found)
     progress.tell(1.0)
     return intake
 
@@ -149,12 +146,12 @@ def read(path: Path, atlas: Atlas, label: int | str | None = None, scale: float 
         scale: millimetres per unit of the file; left out, it is guessed where the size is implausible.
 
     Raises:
-        InputError: when the file cannot be read, or has an error that neither a repair nor an alignment
-            mends.
+        InputError: when the file cannot be read, or cannot be used whatever its unit and place.
     """
-    patient, done, left = repaired(_in_units(read_patient(path, label), scale), atlas.frame)
-    _stop_at_errors(path, [finding for finding in left if finding.topic != "far"])
-    return Intake(patient, tuple(f"{one.sentence}; repaired: {one.remedy}" for one in done), left)
+    patient = repaired(_in_units(read_patient(path, label), scale), atlas.frame)
+    found = check_patient(patient, atlas.frame)
+    _refuse(path.name, (remark for remark in found if remark.topic not in ("far", "units")))
+    return Intake(patient, found)
 
 
 def aligned(
@@ -176,15 +173,16 @@ def aligned(
         progress: told the share of the alignment: the atlas's shape is made, the motion is sought.
 
     Raises:
-        InputError: when landmarks are missing or too few, or no shape is there to align to.
+        InputError: when landmarks are missing or too few, no shape is there to align to, or the unit is open.
         Cancelled: when nobody waits any more.
     """
     points = _landmarks(method, landmarks)
     if method == "none":
         return intake
+    _refuse(intake.patient.source, (remark for remark in intake.found if remark.topic == "units"))
     proposal = _proposal(intake.patient, atlas, known, method, points, progress)
     patient = moved(intake.patient, proposal.transform)
-    return Intake(patient, intake.repairs, check_patient(patient, atlas.frame), method, proposal)
+    return Intake(patient, check_patient(patient, atlas.frame), method, proposal)
 
 
 def _landmarks(align: Method, path: Path | None) -> Landmarks:
@@ -201,13 +199,13 @@ def _in_units(patient: PatientShape, scale: float | None) -> PatientShape:
         return patient
     if not 0 < scale < math.inf:
         raise InputError(f"the scale is {scale:g}; give the millimetres per unit of the file, as 1000")
-    return replace(scaled(patient, scale), units_known=True)
+    return replace(scaled(patient, scale / patient.unit_mm), units_known=True)
 
 
-def _stop_at_errors(path: Path, findings: Sequence[Finding]) -> None:
-    for finding in findings:
-        if finding.kind == "error":
-            raise InputError(f"{path.name}: {finding.sentence}; {finding.remedy}")
+def _refuse(name: str, remarks: Iterable[Remark]) -> None:
+    for remark in remarks:
+        if remark.severity == "refuse":
+            raise InputError(f"{name}: {remark.text}")
 
 
 def _proposal(
@@ -243,8 +241,8 @@ def _told(method: Method, proposal: Proposal) -> str:
     return f"aligned by {method}, {turn}; mean distance to the atlas's shape {ends}{away}"
 
 
-def _doubt(proposal: Proposal) -> tuple[str, ...]:
+def _doubt(proposal: Proposal) -> tuple[Remark, ...]:
     if proposal.rival_deg is None:
         return ()
     other = f"the shape turned by another {proposal.rival_deg:.0f}° fits nearly as well"
-    return (f"{other}; look whether it is upright, or align it by landmarks",)
+    return (Remark("look", "rival", other, "see whether it is upright, or align it by landmarks"),)

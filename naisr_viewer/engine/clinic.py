@@ -112,10 +112,13 @@ class Clinic:
 def _scan(taken: Intake) -> Scan:
     """A scan as the window shows it."""
     from naisr_model.data.patients import decimated
+    from naisr_model.data.remarks import SEVERITIES
 
     whole = taken.patient
     thin = decimated(whole, SHOWN_FACES) if len(whole.mesh_mm.faces) > SHOWN_FACES else whole
-    blocked = [f"{one.sentence}; {one.remedy}" for one in taken.findings if one.kind == "error"]
+    said = {
+        severity: [one.text for one in taken.remarks if one.severity == severity] for severity in SEVERITIES
+    }
     points_mm = _thinned(thin.mesh_mm.vertices) if thin.is_cloud else thin.mesh_mm.vertices
     normals = np.zeros_like(points_mm) if thin.is_cloud else thin.mesh_mm.vertex_normals
     return Scan(
@@ -125,8 +128,9 @@ def _scan(taken: Intake) -> Scan:
         source=whole.source,
         volume_cm3=whole.volume_cm3,
         alignment=taken.alignment,
-        notes=(*taken.repairs, *(remark for remark in taken.remarks if remark not in blocked)),
-        blocked=" ".join(blocked),
+        notes=tuple(said["look"]),
+        repairs=tuple(said["fine"]),
+        blocked=" ".join(said["refuse"]),
     )
 
 

@@ -1,4 +1,4 @@
-"""Surfaces to files in millimetres, each with a record of what it is beside it."""
+"""Surfaces to files, each in its format's unit, with a record of what it is beside it."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ import numpy as np
 
 from naisr_model.covariates import Covariate
 from naisr_model.errors import InputError
+from naisr_model.exports import FORMATS, mesh_bytes
 from naisr_model.files import replacing
 from naisr_viewer import __version__
 from naisr_viewer.panels.kinds import title_of
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.patients import OpenScan
-from naisr_viewer.state.requests import FORMATS, SurfaceResult
+from naisr_viewer.state.requests import SurfaceResult
 
 if TYPE_CHECKING:
     import trimesh
@@ -41,7 +42,7 @@ def write_surface(
     """Write a surface and, beside it, a JSON record of what it shows.
 
     Args:
-        path: the mesh file; its ending is one of :data:`FORMATS`.
+        path: the mesh file; its ending is one of :data:`~naisr_model.exports.FORMATS`.
         result: the surface, in millimetres.
         atlas: where it came from.
         patient: whose it is; None for the population average.
@@ -54,11 +55,12 @@ def write_surface(
     """
     if len(result.faces) == 0:
         raise InputError(f"{title_of(result.request.panel)} has no surface at these values; nothing to write")
-    ending = path.suffix.lower().removeprefix(".")
-    if ending not in FORMATS:
+    ending = next((each for each in FORMATS if path.suffix.lower() == f".{each}"), None)
+    if ending is None:
         raise InputError(f"cannot write '{path.name}'; the ending must be one of {', '.join(FORMATS)}")
     beside = record_of(path)
-    write_atomically(path, lambda place: _write_mesh(place, ending, result))
+    content = mesh_bytes(_triangles(result), ending)
+    write_atomically(path, lambda place: place.write_bytes(content))
     text = json.dumps(description(result, atlas, path.name, patient), indent=2, ensure_ascii=False) + "\n"
     write_atomically(beside, lambda place: place.write_text(text, encoding="utf-8"))
     return path, beside
@@ -82,7 +84,8 @@ def description(
         "view": title_of(request.panel),
         "covariates": {c.name: _covariate_record(c, given.get(c.name, c.centre)) for c in atlas.covariates},
         "depends_on": sorted(given),
-        "length_unit": "mm",
+        "length_unit": "m" if file_name.lower().endswith(".glb") else "mm",
+        "up": "y" if file_name.lower().endswith(".glb") else "z",
         "volume_cm3": round(result.volume_cm3, 4),
         "volume_cm3_is": "of the smooth surface through the vertices, as in the window",
         "volume_of_triangles_cm3": round(_triangles(result).volume / 1000, 4),
@@ -96,7 +99,7 @@ def description(
 
 
 def _triangles(result: SurfaceResult) -> trimesh.Trimesh:
-    import trimesh  # here, and pyvista below, because they would slow down the start
+    import trimesh  # here, because it would slow down the start
 
     points = np.asarray(result.points_mm, dtype=np.float64)
     return trimesh.Trimesh(points, result.faces, vertex_normals=result.normals, process=False)
@@ -119,14 +122,3 @@ def _covariate_record(covariate: Covariate, value: float) -> dict[str, Any]:
     if covariate.kind == "binary":
         record["reading"] = covariate.format(value)
     return record
-
-
-def _write_mesh(path: Path, ending: str, result: SurfaceResult) -> None:
-    if ending == "vtp":
-        import pyvista as pv
-
-        mesh = pv.PolyData.from_regular_faces(result.points_mm, result.faces)
-        mesh.point_data.active_normals = result.normals
-        mesh.save(path)
-        return
-    _triangles(result).export(path, file_type=ending)

@@ -59,7 +59,8 @@ class Scan:
         source: what was read, for example ``p01.stl, 12,034 faces``.
         volume_cm3: enclosed volume; None where the surface is open.
         alignment: how it was moved to the atlas, a sentence; empty where it was not.
-        notes: what was repaired and what is odd, a sentence each.
+        notes: what is odd and has to be looked at, a sentence each.
+        repairs: what was set right or does no harm, a sentence each.
         blocked: what forbids a fit and what to do about it, a sentence; empty where nothing does.
     """
 
@@ -70,6 +71,7 @@ class Scan:
     volume_cm3: float | None = None
     alignment: str = ""
     notes: tuple[str, ...] = ()
+    repairs: tuple[str, ...] = ()
     blocked: str = ""
 
 

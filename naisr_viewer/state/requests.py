@@ -19,9 +19,6 @@ PREVIEW_RESOLUTION = 40
 EXACT_RESOLUTION = 128
 """Cells along a side of the box at rest; also the density of a preview by tabulated displacements."""
 
-FORMATS = ("stl", "ply", "obj", "vtp", "glb")
-"""Mesh files that can be written."""
-
 Scale = Literal["signed", "unsigned"]
 """Of numbers shown as colours: from minus to plus a limit, or from 0 to it."""
 
@@ -115,7 +112,7 @@ class ExportChoice:
 
     Attributes:
         panels: the surfaces.
-        format: one of :data:`FORMATS`.
+        format: one of :data:`~naisr_model.exports.FORMATS`.
         resolution: cells along a side of the box.
         folder: made when it is missing.
     """

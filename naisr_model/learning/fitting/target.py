@@ -11,6 +11,7 @@ import trimesh
 from numpy.typing import ArrayLike, NDArray
 from torch import Tensor
 
+from naisr_model.data.meshes import is_closed
 from naisr_model.data.samples import sample_shape
 from naisr_model.errors import InputError
 from naisr_model.frames import Frame
@@ -55,7 +56,7 @@ def target_of(shape: trimesh.Trimesh | ArrayLike, frame: Frame, seed: int = 0) -
         order = np.random.default_rng(seed).permutation(len(points_mm))
         surface = frame.to_model(points_mm[order]).astype(np.float32)
         return Target(surface, np.zeros((0, frame.dim + 1), np.float32))
-    near = NEAR_SAMPLES if mesh.is_watertight else 0
+    near = NEAR_SAMPLES if is_closed(mesh) else 0
     samples = sample_shape(mesh, frame, SURFACE_SAMPLES, near, 0, seed)
     return Target(samples.surface[:, : frame.dim], samples.near)
 

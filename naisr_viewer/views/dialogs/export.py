@@ -16,10 +16,11 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from naisr_model.exports import FORMATS
 from naisr_viewer.panels.kinds import panels_in, title_of
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.layouts import Layout, Panel
-from naisr_viewer.state.requests import EXACT_RESOLUTION, FORMATS, ExportChoice
+from naisr_viewer.state.requests import EXACT_RESOLUTION, ExportChoice
 from naisr_viewer.views.dialogs.pieces import buttons_of, column_in
 
 RESOLUTIONS = (64, EXACT_RESOLUTION, 192, 256)
@@ -69,7 +70,9 @@ class ExportDialog(QDialog):
         form.addRow("Detail", self.detail)
         form.addRow("Folder", where)
         note = QLabel(
-            "Millimetres. A record beside each file (.json) tells the covariates and the atlas.", self
+            "Millimetres, z up; GLB: metres, y up, as the format says. A record beside each file (.json) "
+            "tells the covariates and the atlas.",
+            self,
         )
         note.setObjectName("muted")
         note.setWordWrap(True)

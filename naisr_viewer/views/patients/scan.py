@@ -31,6 +31,7 @@ class ScanPart(QWidget):
         self.blocked = paragraph(style="blocked")
         self.notes = QWidget()
         self._notes_shown: tuple[str, ...] = ()
+        self.repairs = paragraph(style="muted")
         self.ghost = QCheckBox("Show the scan over the shape")
         self.ghost.setToolTip("Draw what was measured, transparent, over the atlas's shape")
         self._compose()
@@ -45,6 +46,8 @@ class ScanPart(QWidget):
             self._notes_shown = scan.notes
             self.notes = exchange(self.notes, warnings(scan.notes))
         self.notes.setVisible(bool(scan.notes))
+        self.repairs.setText("\n".join(map(sentence, scan.repairs)))
+        self.repairs.setVisible(bool(scan.repairs))
         self.blocked.setText(sentence(scan.blocked))
         self.blocked.setVisible(bool(scan.blocked))
         self.changed.setVisible(patient.is_changed)
@@ -63,7 +66,7 @@ class ScanPart(QWidget):
         column = section(self, "Scan", self.reread)
         column.addWidget(self.changed)
         column.addLayout(facts)
-        for widget in (self.blocked, self.notes, self.ghost):
+        for widget in (self.blocked, self.notes, self.repairs, self.ghost):
             column.addWidget(widget)
 
 

@@ -74,7 +74,7 @@ def test_a_mesh_of_the_atlas_is_written_in_millimetres(naisr, egg_atlas, tmp_pat
         (["mesh", "ATLAS", "x.stl", "--set", "age=99"], "the atlas was trained on 1 to"),
         (["mesh", "ATLAS", "x.stl", "--set", "age=old"], "expected a number in years"),
         (["mesh", "ATLAS", "x.stl", "--set", "length=1"], "NAME=VALUE with one of age, sex"),
-        (["mesh", "ATLAS", "x.doc"], "name the file .stl, .ply, .obj or .glb"),
+        (["mesh", "ATLAS", "x.doc"], "name the file .stl, .ply, .obj, .vtp or .glb"),
         (["mesh", "ATLAS", "x.stl", "--effect", "age"], "--set age=VALUE"),
         (["mesh", "ATLAS", "x.stl", "--effect", "size"], "unknown covariate 'size'; this atlas has age, sex"),
         (["mesh", "nowhere.safetensors", "x.stl"], "there is no atlas at"),

@@ -8,11 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import pyvista
 import trimesh
 from eggs import egg, label_volume, saved, turned
 
 from naisr_model import cli
 from naisr_model.atlas import Alternative, Atlas, Fit
+from naisr_model.exports import mesh_bytes
 
 KNOWN = ["--known", "age=6,sex=M"]
 TRUE_CM3 = egg(6.0, 1.0).volume / 1000
@@ -40,7 +42,7 @@ def plain(told, tmp_path_factory) -> dict:
 def test_a_sound_file_is_fitted_as_it_lies(plain):
     patient = plain["patient"]
     assert patient["source"] == "egg.stl, 1,280 faces"
-    assert patient["repairs"] == [] and patient["alignment"] is None
+    assert patient["remarks"] == [] and patient["alignment"] is None
     assert np.array_equal(patient["file_to_atlas"], np.eye(4))
     assert plain["volume_cm3"] == pytest.approx(TRUE_CM3, rel=0.05)
 
@@ -48,18 +50,19 @@ def test_a_sound_file_is_fitted_as_it_lies(plain):
 def test_metres_are_repaired_and_said_so(told, plain, tmp_path, capsys):
     record = told(saved(egg(6.0, 1.0), tmp_path / "m.stl", np.diag([1e-3, 1e-3, 1e-3, 1])))
     assert record["volume_cm3"] == pytest.approx(plain["volume_cm3"], rel=0.01)
-    (repair,) = record["patient"]["repairs"]
-    assert "look like metres" in repair and "scale it by 1000" in repair
+    (remark,) = record["patient"]["remarks"]
+    assert (remark["severity"], remark["topic"]) == ("fine", "units")
+    assert "look like metres" in remark["sentence"] and "was scaled by 1000" in remark["sentence"]
     assert np.allclose(record["patient"]["file_to_atlas"], np.diag([1000, 1000, 1000, 1]))
     said = capsys.readouterr().err
-    assert "naisr: read m.stl" in said and repair in said
+    assert "naisr: read m.stl" in said and f"naisr: fine: {remark['sentence']}" in said
 
 
 def test_a_stated_unit_is_not_guessed(told, plain, tmp_path, egg_atlas, capsys):
     path = saved(egg(6.0, 1.0), tmp_path / "odd.stl", np.diag([0.5, 0.5, 0.5, 1]))
     record = told(path, "--scale", "2")
     assert record["volume_cm3"] == pytest.approx(plain["volume_cm3"], rel=0.01)
-    assert record["patient"]["repairs"] == []
+    assert record["patient"]["remarks"] == []
     assert cli.main(["fit", str(path), "--atlas", str(egg_atlas), "--scale", "2000"]) == 2
     assert "scale it to millimetres" in capsys.readouterr().err
 
@@ -68,7 +71,7 @@ def test_a_small_part_in_a_stated_unit_is_no_mistake(told, tmp_path):
     points = egg(6.0, 1.0).sample(20_000, seed=0)
     np.savetxt(tmp_path / "tip.xyz", points[points[:, 2] > 31.5])
     remarks = told(tmp_path / "tip.xyz", "--scale", "1")["patient"]["remarks"]
-    assert any("check that it is this anatomy" in remark for remark in remarks)
+    assert any("check that it is this anatomy" in remark["remedy"] for remark in remarks)
 
 
 def test_icp_brings_a_moved_scan_home(told, plain, tmp_path, capsys):
@@ -105,7 +108,7 @@ def test_points_and_a_part_will_do(told, plain, tmp_path):
         for words in ([], ["--align", "icp"]):
             record = told(path, *words)
             assert record["volume_cm3"] == pytest.approx(plain["volume_cm3"], rel=0.08)
-    assert any("the surface is open" in remark for remark in record["patient"]["remarks"])
+    assert any("the surface is open" in remark["sentence"] for remark in record["patient"]["remarks"])
 
 
 def test_transfer_and_evolve_take_the_same_way_in(egg_atlas, tmp_path, capsys):
@@ -241,3 +244,42 @@ def test_a_model_without_covariates_is_only_fitted(egg_deepsdf, patient, words, 
     assert cli.main(["fit", *given, "--json", str(tmp_path / "fit.json")]) == 0
     assert json.loads((tmp_path / "fit.json").read_text())["lasting"] is None
     assert "volume: " in capsys.readouterr().out and (tmp_path / "out" / "shapes.png").exists()
+
+
+@pytest.mark.parametrize("ending", ["glb", "vtp"])
+def test_what_mesh_writes_fit_reads(told, egg_atlas, tmp_path, ending):
+    path = tmp_path / f"shape.{ending}"
+    assert (
+        cli.main(
+            ["mesh", str(egg_atlas), str(path), "--set", "age=6", "--set", "sex=M", "--resolution", "64"]
+        )
+        == 0
+    )
+    record = told(path)
+    own_cm3 = record["patient"]["volume_cm3"]
+    assert own_cm3 == pytest.approx(TRUE_CM3, rel=0.05)
+    assert record["volume_cm3"] == pytest.approx(own_cm3, rel=0.05)
+    remarks = record["patient"]["remarks"]
+    assert [remark["topic"] for remark in remarks] == (["convention"] if ending == "glb" else [])
+
+
+@pytest.mark.parametrize("ending", ["stl", "ply", "vtk", "vtp", "glb"])
+def test_a_file_that_was_cut_off_ends_with_one_sentence(egg_atlas, tmp_path, ending, capfd):
+    path = tmp_path / f"cut.{ending}"
+    if ending == "vtk":
+        pyvista.wrap(egg(6.0, 1.0)).save(path)
+    else:
+        path.write_bytes(mesh_bytes(egg(6.0, 1.0), ending))
+    path.write_bytes(path.read_bytes()[: path.stat().st_size * 3 // 5])
+    assert cli.main(["fit", str(path), "--atlas", str(egg_atlas)]) == 2
+    out, said = capfd.readouterr()
+    assert out == "" and said.startswith(f"naisr: {path.name} is cut off") and said.count("\n") == 1
+
+
+def test_two_units_that_fit_are_asked_for(egg_atlas, tmp_path, capsys):
+    """0.9 and 25.4 times as long as the largest egg, or 10 times, are both plausible."""
+    path = saved(egg(6.0, 1.0), tmp_path / "unit.stl", np.diag([0.04, 0.04, 0.04, 1]))
+    assert cli.main(["fit", str(path), "--atlas", str(egg_atlas)]) == 2
+    said = capsys.readouterr().err
+    assert "--scale 10 for centimetres or --scale 25.4 for inches" in said and said.count("\n") == 1
+    assert cli.main(["fit", str(path), "--atlas", str(egg_atlas), "--scale", "25.4"]) == 0

@@ -9,20 +9,22 @@ import pytest
 import pyvista
 import trimesh
 
+from naisr_model.data.meshes import hole_areas_mm2
 from naisr_model.data.patients import (
     MOST_FACES,
     PatientShape,
     check_patient,
     decimated,
     flipped,
-    hole_areas_mm2,
     largest_component,
+    ras_to_lps,
     read_patient,
     read_points,
     repaired,
     scaled,
 )
 from naisr_model.errors import InputError
+from naisr_model.exports import mesh_bytes
 from naisr_model.frames import Frame
 
 FRAME = Frame((0.0, 0.0, 0.0), 115.0)
@@ -42,16 +44,19 @@ def cloud(points) -> trimesh.Trimesh:
 
 
 def topics(patient: PatientShape) -> list[str]:
-    return [finding.topic for finding in check_patient(patient, FRAME)]
+    return [remark.topic for remark in check_patient(patient, FRAME)]
 
 
 # --- reading ------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("suffix", [".stl", ".ply", ".obj", ".vtk", ".vtp", ".glb"])
-def test_a_sound_mesh_has_no_findings(tmp_path, suffix):
+def test_a_sound_mesh_has_no_remarks(tmp_path, suffix):
     path = tmp_path / f"scan{suffix}"
-    body().export(path) if suffix == ".glb" else pyvista.wrap(body()).save(path)
+    if suffix == ".glb":
+        path.write_bytes(mesh_bytes(body(), "glb"))
+    else:
+        pyvista.wrap(body()).save(path)
     patient = read_patient(path)
     assert patient.is_closed and not patient.is_cloud
     assert patient.source == f"scan{suffix}, 5,120 faces"
@@ -110,11 +115,11 @@ def test_text_that_is_no_points_is_explained(tmp_path, name):
 
 def test_other_files_are_explained(tmp_path):
     (tmp_path / "picture.xyz").write_bytes(bytes(range(256)))
-    with pytest.raises(InputError, match=r"picture\.xyz cannot be read"):
+    with pytest.raises(InputError, match=r"picture\.xyz is no text"):
         read_patient(tmp_path / "picture.xyz")
-    with pytest.raises(InputError, match=r"gone\.xyz cannot be read"):
+    with pytest.raises(InputError, match=r"gone\.xyz does not exist"):
         read_patient(tmp_path / "gone.xyz")
-    (tmp_path / "scan.dcm").write_bytes(b"")
+    (tmp_path / "scan.dcm").write_bytes(b"no mesh")
     with pytest.raises(InputError, match=r"scan\.dcm is not one of .*\.nrrd.*\.xyz"):
         read_patient(tmp_path / "scan.dcm")
     body().export(tmp_path / "scan.ply")
@@ -154,7 +159,7 @@ def test_a_label_is_chosen(tmp_path, name):
     assert patient.mesh_mm.volume == pytest.approx(4 / 3 * np.pi * 12**3, rel=0.005)
     np.testing.assert_allclose(patient.mesh_mm.center_mass, [120, -30, 40], atol=0.02)
     (remark,) = read_patient(path, label=4).remarks
-    assert "edge of the image" in remark.sentence
+    assert remark.severity == "look" and "edge of the image" in remark.text
 
 
 def test_a_volume_without_labels_is_rejected(tmp_path):
@@ -171,27 +176,59 @@ def test_a_volume_without_labels_is_rejected(tmp_path):
 def test_units_are_guessed_and_set_right(unit, mm):
     size = 0.55 if unit == "inches" else 1.0  # at full size inches could as well be small centimetres
     patient = scaled(PatientShape(body()), size / mm)
-    (finding,) = check_patient(patient, FRAME)
-    assert (finding.kind, finding.topic) == ("error", "units")
-    assert f"look like {unit}" in finding.sentence
-    right, done, left = repaired(patient, FRAME)
+    (remark,) = check_patient(patient, FRAME)
+    assert (remark.severity, remark.topic) == ("refuse", "units")
+    assert f"look like {unit}" in remark.sentence
+    right = repaired(patient, FRAME)
     np.testing.assert_allclose(right.mesh_mm.bounds, size * body().bounds, rtol=1e-9)
-    assert done == (finding,) and left == ()
+    (told,) = right.remarks
+    assert (told.severity, told.topic) == ("fine", "units") and told.text.endswith(f"it was scaled by {mm:g}")
+    assert check_patient(right, FRAME) == ()
+
+
+def test_two_units_that_explain_a_size_are_not_guessed_between():
+    """71 might be inches, a person, or centimetres, a small child."""
+    people = Frame((0.0, 0.0, 0.0), 1150.0)
+    patient = scaled(PatientShape(body()), 71 / 120)
+    (remark,) = check_patient(patient, people)
+    assert (remark.severity, remark.topic) == ("refuse", "units")
+    assert "look like centimetres or inches" in remark.text
+    assert "--scale 10 for centimetres or --scale 25.4 for inches" in remark.remedy
+    assert repaired(patient, people) is patient
+
+
+def test_a_glb_in_millimetres_is_told_from_one_in_metres(tmp_path):
+    (tmp_path / "scan.glb").write_bytes(mesh_bytes(body(), "glb"))
+    metres = read_patient(tmp_path / "scan.glb")
+    assert metres.unit_mm == 1000 and check_patient(metres, FRAME) == ()
+    body().export(tmp_path / "scan.glb")  # against the convention
+    patient = repaired(read_patient(tmp_path / "scan.glb"), FRAME)
+    assert patient.mesh_mm.volume == pytest.approx(body().volume, rel=1e-5)
+    assert "look like millimetres" in patient.remarks[-1].text
+
+
+def test_debris_does_not_hide_the_unit_or_the_place():
+    crumb = trimesh.creation.icosphere(2, radius=1.0)
+    crumb.apply_translation([900.0, 0.0, 0.0])
+    patient = PatientShape(body() + crumb)
+    assert sorted(topics(patient)) == ["components", "debris"]
+    points = np.vstack([body().vertices, [[900.0, 0.0, 0.0]]])
+    assert topics(PatientShape(cloud(points))) == ["debris"]
 
 
 def test_a_size_that_no_unit_explains_is_left_to_a_person():
-    (finding,) = check_patient(scaled(PatientShape(body()), 7.0), FRAME)
-    assert finding.topic == "units" and finding.repair is None
-    assert "840 mm long" in finding.sentence and "200 mm" in finding.sentence
+    (remark,) = check_patient(scaled(PatientShape(body()), 7.0), FRAME)
+    assert (remark.severity, remark.topic) == ("refuse", "units")
+    assert "840 mm long" in remark.sentence and "200 mm" in remark.sentence
 
 
 def test_voxel_indices_are_suspected():
     grid = np.zeros((60, 60, 60), np.float32)
     grid[10:50, 15:45, 20:40] = 1
     surface = pyvista.wrap(grid).contour([0.5], method="flying_edges")
-    (finding,) = check_patient(PatientShape(trimesh.Trimesh(surface.points, surface.regular_faces)), FRAME)
-    assert finding.topic == "voxels"
-    assert "voxel size" in finding.remedy
+    (remark,) = check_patient(PatientShape(trimesh.Trimesh(surface.points, surface.regular_faces)), FRAME)
+    assert remark.topic == "voxels"
+    assert "voxel size" in remark.remedy
 
 
 def test_unusable_shapes_are_errors():
@@ -203,27 +240,29 @@ def test_unusable_shapes_are_errors():
     doubled = trimesh.Trimesh(sheet.vertices, np.vstack([sheet.faces, sheet.faces[:, ::-1]]), process=False)
     cases = {"empty": cloud(np.zeros((0, 3))), "numbers": broken, "flat": cloud(flat)}
     for topic, mesh in {**cases, "few": cloud(body().vertices[:9])}.items():
-        (finding,) = check_patient(PatientShape(mesh), FRAME)
-        assert (finding.kind, finding.topic) == ("error", "empty" if topic == "few" else topic)
+        (remark,) = check_patient(PatientShape(mesh), FRAME)
+        assert (remark.severity, remark.topic) == ("refuse", "empty" if topic == "few" else topic)
     assert topics(PatientShape(doubled)) == ["flat"]
 
 
 def test_a_shape_far_away_must_be_aligned():
     away = body()
     away.apply_translation([0, 0, 900.0])
-    (finding,) = check_patient(PatientShape(away), FRAME)
-    assert (finding.kind, finding.topic) == ("error", "far")
-    assert "905 mm" in finding.sentence and "icp" in finding.remedy
+    (remark,) = check_patient(PatientShape(away), FRAME)
+    assert (remark.severity, remark.topic) == ("refuse", "far")
+    assert "905 mm" in remark.sentence and "icp" in remark.remedy
     away.apply_translation([0, 0, -795.0])
-    (finding,) = check_patient(PatientShape(away), FRAME)
-    assert (finding.kind, finding.topic) == ("warning", "outside")
+    (remark,) = check_patient(PatientShape(away), FRAME)
+    assert (remark.severity, remark.topic) == ("look", "outside")
 
 
 def test_faces_that_look_inward_are_turned():
     inside_out = body()
     inside_out.invert()
-    patient, (finding,), left = repaired(PatientShape(inside_out), FRAME)
-    assert finding.topic == "inverted" and "100 % of the faces" in finding.sentence and left == ()
+    patient = repaired(PatientShape(inside_out), FRAME)
+    (remark,) = patient.remarks
+    assert remark.topic == "inverted" and "100 % of the faces looked inward" in remark.sentence
+    assert check_patient(patient, FRAME) == ()
     assert patient.mesh_mm.volume == pytest.approx(body().volume)
 
 
@@ -244,11 +283,11 @@ def test_components_are_counted_and_the_largest_kept():
     crumb = trimesh.creation.icosphere(2, radius=3.0)
     crumb.apply_translation([70.0, 0.0, 0.0])
     patient = PatientShape(body() + crumb)
-    (finding,) = check_patient(patient, FRAME)
+    (remark,) = check_patient(patient, FRAME)
     share = body().area / (body().area + crumb.area)
-    assert (finding.kind, finding.topic) == ("warning", "components")
-    assert "2 components" in finding.sentence and f"{100 * share:.1f} %" in finding.sentence
-    assert repaired(patient, FRAME)[0] is patient
+    assert (remark.severity, remark.topic) == ("look", "components")
+    assert "2 components" in remark.sentence and f"{100 * share:.1f} %" in remark.sentence
+    assert repaired(patient, FRAME) is patient
     kept = largest_component(patient)
     assert kept.mesh_mm.volume == pytest.approx(body().volume)
     assert check_patient(kept, FRAME) == ()
@@ -262,9 +301,9 @@ def test_holes_are_measured():
     cap_mm2 = 32 * 10.0**2 * np.sin(2 * np.pi / 64)
     np.testing.assert_allclose(hole_areas_mm2(tube), [cap_mm2, cap_mm2], rtol=1e-6)
     tube = tube.subdivide_to_size(20.0)
-    (finding,) = check_patient(PatientShape(tube), FRAME)
-    assert (finding.kind, finding.topic) == ("warning", "open")
-    assert f"2 holes of {200 * cap_mm2 / (2 * cap_mm2 + tube.area):.1f} %" in finding.sentence
+    (remark,) = check_patient(PatientShape(tube), FRAME)
+    assert (remark.severity, remark.topic) == ("look", "open")
+    assert f"2 holes of {200 * cap_mm2 / (2 * cap_mm2 + tube.area):.1f} %" in remark.sentence
     assert not len(hole_areas_mm2(body()))
 
 
@@ -274,10 +313,9 @@ def test_stated_ras_is_told(tmp_path):
     content[:29] = b"3D Slicer output. SPACE=RAS  "
     (tmp_path / "scan.stl").write_bytes(content)
     patient = read_patient(tmp_path / "scan.stl")
-    (finding,) = check_patient(patient, FRAME)
-    assert (finding.kind, finding.topic) == ("warning", "space")
-    assert finding.repair is not None
-    turned = finding.repair(patient)
+    (remark,) = check_patient(patient, FRAME)
+    assert (remark.severity, remark.topic) == ("look", "space")
+    turned = ras_to_lps(patient)
     np.testing.assert_allclose(turned.mesh_mm.center_mass, [-3, 4, 5], atol=1e-3)
     assert check_patient(turned, FRAME) == ()
 
@@ -285,8 +323,9 @@ def test_stated_ras_is_told(tmp_path):
 def test_a_very_fine_surface_is_decimated():
     fine = trimesh.creation.torus(50.0, 20.0, major_sections=900, minor_sections=300)
     assert len(fine.faces) > MOST_FACES
-    patient, (finding,), left = repaired(PatientShape(fine), FRAME)
-    assert finding.topic == "fine" and left == ()
+    patient = repaired(PatientShape(fine), FRAME)
+    (remark,) = patient.remarks
+    assert remark.topic == "fine" and "was thinned" in remark.text and check_patient(patient, FRAME) == ()
     assert len(patient.mesh_mm.faces) < MOST_FACES
     assert patient.is_closed
     assert patient.mesh_mm.volume == pytest.approx(fine.volume, rel=1e-3)

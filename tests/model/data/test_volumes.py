@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from naisr_model.data.patients import read_patient, rim
+from naisr_model.data.meshes import rim
+from naisr_model.data.patients import read_patient
 from naisr_model.data.volumes import (
     LabelVolume,
     choose,

@@ -35,13 +35,15 @@ def test_labels_can_be_listed_before_one_is_read(egg_atlas, tmp_path):
 def test_a_person_may_look_before_aligning(egg_atlas, tmp_path):
     atlas, path = Atlas.load(egg_atlas), saved(egg(6.0, 1.0), tmp_path / "far.stl", turned(0, [0, 0, 400]))
     far = read(path, atlas)
-    assert not far.is_ready and [finding.topic for finding in far.findings] == ["far"]
-    assert "align it to the atlas" in far.remarks[0]
+    assert not far.is_ready and [remark.topic for remark in far.found] == ["far"]
+    assert "align it to the atlas" in far.remarks[0].text
     assert aligned(far, atlas, {"age": 6.0}, "none") is far
     home = aligned(far, atlas, {"age": 6.0}, "icp")
-    assert home.is_ready and home.findings == () and home.method == "icp"
+    assert home.is_ready and home.found == () and home.method == "icp"
     assert home.proposal is not None and home.proposal.turned_deg < 20
-    assert any("fits nearly as well" in remark for remark in home.remarks), "an egg turned over is an egg"
+    assert any("fits nearly as well" in remark.text for remark in home.remarks), (
+        "an egg turned over is an egg"
+    )
     assert home.proposal is not None and home.proposal.after_mm < 1.5 < 300 < home.proposal.before_mm
     assert np.array_equal(far.patient.from_file, np.eye(4)), "the proposal can still be declined"
     whole = take_in(path, atlas, {"age": 6.0}, align="icp")
@@ -68,7 +70,9 @@ def test_landmarks_follow_the_repairs(egg_atlas, tmp_path):
     intake = take_in(path, Atlas(checkpoint), {"age": 6.0}, align="landmarks", landmarks=landmarks)
     assert np.allclose(intake.patient.from_file @ in_metres, np.eye(4), atol=1e-6)
     assert intake.proposal is not None and intake.proposal.landmarks_mm == pytest.approx(0, abs=1e-6)
-    assert len(intake.repairs) == 1 and "landmarks 0.00 mm apart" in intake.sentences[2]
+    assert [remark.severity for remark in intake.remarks] == [
+        "fine"
+    ] and "landmarks 0.00 mm apart" in intake.sentences[2]
 
 
 def test_an_alignment_tells_how_far_it_is_and_can_be_stopped(egg_atlas, tmp_path):

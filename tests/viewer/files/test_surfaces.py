@@ -13,9 +13,10 @@ import trimesh
 
 from naisr_model import __version__
 from naisr_model.errors import InputError
+from naisr_model.exports import FORMATS
 from naisr_viewer.files import surfaces as export
 from naisr_viewer.state.layouts import FULL_SHAPE, Panel
-from naisr_viewer.state.requests import FORMATS, SurfaceRequest, SurfaceResult
+from naisr_viewer.state.requests import SurfaceRequest, SurfaceResult
 
 VALUES = {"age": 150.0, "weight": 50.0, "sex": 1.0}
 
@@ -30,17 +31,21 @@ def read(path: Path) -> trimesh.Trimesh:
         mesh = pv.read(path)
         return trimesh.Trimesh(mesh.points, mesh.regular_faces)
     mesh = trimesh.load_mesh(path)
+    if path.suffix == ".glb":  # metres, y up
+        mesh.apply_transform([[1000, 0, 0, 0], [0, 0, -1000, 0], [0, 1000, 0, 0], [0, 0, 0, 1]])
     mesh.merge_vertices()  # STL has no shared vertices
     return mesh
 
 
 @pytest.mark.parametrize("ending", FORMATS)
-def test_every_format_holds_the_true_shape_in_millimetres(result, card, atlas, tmp_path, ending):
+def test_every_format_holds_the_true_shape_in_its_unit(result, card, atlas, tmp_path, ending):
     path, _ = export.write_surface(tmp_path / f"shape.{ending}", result, card)
     mesh = read(path)
     assert mesh.volume / 1000 == pytest.approx(atlas.volume_cm3(**VALUES), rel=0.01)
     assert mesh.volume == pytest.approx(trimesh.Trimesh(result.points_mm, result.faces).volume, rel=1e-4)
     assert mesh.is_watertight
+    record = json.loads(export.record_of(path).read_text(encoding="utf-8"))
+    assert (record["length_unit"], record["up"]) == (("m", "y") if ending == "glb" else ("mm", "z"))
     np.testing.assert_allclose(mesh.extents / 2, atlas.half_axes_mm(**VALUES), rtol=0.01)
 
 

@@ -1,0 +1,250 @@
+"""Opening files, and telling what is in them by their content, whatever their name says.
+
+:func:`content_of` opens any path and says in a sentence why it cannot; :func:`format_of` names the format,
+and :func:`refuse_foreign` says of what is no shape what it is and what to do with it.
+"""
+
+from __future__ import annotations
+
+import codecs
+import errno
+import gzip
+import re
+import stat
+import struct
+import zlib
+from pathlib import Path
+
+from naisr_model.errors import InputError
+
+MOST_BYTES = 2 << 30
+"""Of one mesh, unpacked; what is longer would not fit into the memory of most computers."""
+
+_SPECIAL = {
+    stat.S_ISDIR: ("is a folder", "give a file in it"),
+    stat.S_ISFIFO: ("is a pipe", "write its content into a file first"),
+    stat.S_ISSOCK: ("is a socket", "give a file"),
+    stat.S_ISCHR: ("is a device", "give a file"),
+    stat.S_ISBLK: ("is a device", "give a file"),
+}
+
+
+def check_path(path: str | Path) -> Path:
+    """The path of a file that is there and has content.
+
+    Raises:
+        InputError: when nothing is there, or a folder, a pipe, a link to nowhere or to itself, an empty file,
+            or what may not be looked at.
+    """
+    path = Path(path)
+    try:
+        state = path.stat()
+    except (OSError, ValueError) as error:
+        raise InputError(_why_not_there(path, error)) from error
+    for applies, (what, remedy) in _SPECIAL.items():
+        if applies(state.st_mode):
+            raise InputError(f"{path} {what}; {remedy}")
+    if not state.st_size:
+        raise InputError(f"{path.name} is empty (0 bytes); copy or export it again")
+    return path
+
+
+def content_of(path: str | Path) -> bytes:
+    """All bytes of a file.
+
+    Raises:
+        InputError: as :func:`check_path`, and when it may not be read or is larger than :data:`MOST_BYTES`.
+    """
+    path = check_path(path)
+    try:
+        size = path.stat().st_size
+        if size > MOST_BYTES:
+            raise InputError(f"{path.name} has {size / 2**30:.1f} GiB; thin the surface and export it again")
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(_why_not_there(path, error)) from error
+
+
+def _why_not_there(path: Path, error: OSError | ValueError) -> str:
+    if not isinstance(error, OSError):
+        return f"{str(path)!r} is no path ({error}); correct it"
+    if error.errno == errno.ELOOP:
+        return f"{path} is a link that leads back to itself; give the file that is meant"
+    if error.errno == errno.ENOENT and path.is_symlink():
+        return f"{path} is a link to {path.readlink()}, which does not exist; give the file that is meant"
+    if error.errno == errno.ENOENT:
+        return f"{path} does not exist; correct the path"
+    if error.errno == errno.ENOTDIR:
+        return f"{path} does not exist, since a part of it is a file and no folder; correct the path"
+    if error.errno in (errno.EACCES, errno.EPERM):
+        return f"{path} may not be read by you; change its permissions or copy it"
+    return f"{path} cannot be read ({error.strerror or error}); correct the path or copy the file"
+
+
+# --- what it is ---------------------------------------------------------------------------------
+
+MESHES = {"stl": "STL", "ply": "PLY", "obj": "OBJ", "vtk": "VTK", "vtp": "VTP", "glb": "GLB"}
+"""The formats of meshes that are read, by their usual endings."""
+
+_VOLUME = "choose the segmentation among the label volumes (.nii, .nii.gz, .nrrd)"
+_MAGIC: tuple[tuple[bytes, str, str], ...] = (
+    (b"\x1f\x8b", "compressed with gzip", "unpack it first"),
+    (b"BZh", "compressed with bzip2", "unpack it first"),
+    (b"\xfd7zXZ\x00", "compressed with xz", "unpack it first"),
+    (b"\x28\xb5\x2f\xfd", "compressed with zstd", "unpack it first"),
+    (b"7z\xbc\xaf\x27\x1c", "a 7z archive", "unpack it and give the mesh inside"),
+    (b"Rar!", "a RAR archive", "unpack it and give the mesh inside"),
+    (b"%PDF", "a PDF document", "export the surface itself, as STL or PLY"),
+    (b"\x89PNG", "a picture (PNG)", "export the surface itself, as STL or PLY"),
+    (b"\xff\xd8\xff", "a picture (JPEG)", "export the surface itself, as STL or PLY"),
+    (b"GIF8", "a picture (GIF)", "export the surface itself, as STL or PLY"),
+    (b"NRRD000", "an NRRD volume", "name it .nrrd"),
+    (b"Kaydara FBX", "an FBX file", "save it as STL, PLY or OBJ"),
+    (b"ISO-10303-21", "a STEP file", "save it as STL, PLY or OBJ"),
+    (b"\x89HDF", "an HDF5 file", "export the surface as STL or PLY"),
+    (b"version https://git-lfs", "a pointer of Git LFS", "fetch the file itself with 'git lfs pull'"),
+    (b"\xd0\xcf\x11\xe0", "an Office document", "export the surface itself, as STL or PLY"),
+    (b"BLENDER", "a Blender file", "export the surface as STL or PLY"),
+    (b"OFF", "an OFF file", "save it as STL, PLY or OBJ"),
+    (b"COFF", "an OFF file", "save it as STL, PLY or OBJ"),
+)
+_NIFTI = (b"n+1\0", b"ni1\0")
+_BEFORE_ROOT = re.compile(rb"\s*(<\?.*?\?>|<!--.*?-->|<!DOCTYPE\s+)", re.DOTALL | re.IGNORECASE)
+_ROOT = re.compile(rb"\s*<?\s*([A-Za-z][\w:]*)")
+_ROOTS = {
+    "html": ("a web page", "download the file itself"),
+    "collada": ("a COLLADA file", "save it as STL, PLY or OBJ"),
+    "x3d": ("an X3D file", "save it as STL, PLY or OBJ"),
+    "amf": ("an AMF file", "save it as STL, PLY or OBJ"),
+    "svg": ("a drawing (SVG)", "export the surface itself, as STL or PLY"),
+}
+_START = 4096
+_STL_HEADER = 84
+_STL_FACE = 50
+_NO_COUNT = (0, 0xFFFFFFFF)
+
+
+def plain(content: bytes) -> bytes:
+    """The content without the marks of Unicode at its start; UTF-16 becomes UTF-8."""
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return content.decode("utf-16", errors="replace").encode()
+    return content.removeprefix(codecs.BOM_UTF8)
+
+
+def is_text(content: bytes) -> bool:
+    """Whether the start of the content is text: no zero bytes, few control characters."""
+    start = content[:_START]
+    odd = sum(byte < 9 or 13 < byte < 32 for byte in start)
+    return odd == 0 or (0 not in start and odd < len(start) / 100)
+
+
+def format_of(content: bytes, ending: str) -> str:
+    """The mesh format of a content, a key of :data:`MESHES`; empty where it is none of them.
+
+    Args:
+        content: as :func:`plain` gives it.
+        ending: of the file's name, without the dot; settles what has no mark of its own: binary STL and OBJ.
+    """
+    start = content[:_START].lstrip()
+    if not content.strip(b"\0"):
+        return ""
+    if re.match(rb"ply\s", start):
+        return "ply"
+    if start.startswith(b"# vtk DataFile"):
+        return "vtk"
+    if start.startswith(b"glTF"):
+        return "glb"
+    if b"<VTKFile" in start:
+        return "vtp"
+    if re.match(rb"solid\b", start, re.IGNORECASE) and is_text(content) and _has_facets(content):
+        return "stl"
+    if _is_binary_stl(content, ending):
+        return "stl"
+    return "obj" if is_text(content) and _is_obj(content, ending) else ""
+
+
+def _has_facets(content: bytes) -> bool:
+    return re.search(rb"\b(facet|vertex|end\s*solid)\b", content[: 1 << 16], re.IGNORECASE) is not None
+
+
+def _is_binary_stl(content: bytes, ending: str) -> bool:
+    if len(content) < _STL_HEADER:
+        return False
+    (faces,) = struct.unpack_from("<I", content, 80)
+    if faces not in _NO_COUNT and len(content) == _STL_HEADER + _STL_FACE * faces:
+        return True
+    return ending == "stl" and not is_text(content) and not _known(content)
+
+
+def _is_obj(content: bytes, ending: str) -> bool:
+    pattern = rb"^(v|f)[ \t]+\S+[ \t]+\S+[ \t]+\S+" if ending == "obj" else rb"^v[ \t]+\S+[ \t]+\S+[ \t]+\S+"
+    return re.search(pattern, content[: 1 << 20], re.MULTILINE) is not None
+
+
+def _known(content: bytes) -> bool:
+    return foreign(content) is not None
+
+
+def foreign(content: bytes) -> tuple[str, str] | None:
+    """What a content is that is no mesh, and what to do with it; None where that is not known."""
+    start = content[:_START].lstrip()
+    if content[:4] in (b"PK\x03\x04", b"PK\x05\x06"):
+        is_3mf = b"3dmodel.model" in content or b"3D/" in content
+        office = b"[Content_Types].xml" in content[:_START] and not is_3mf
+        if is_3mf:
+            return "a 3MF file", "save it as STL, PLY or OBJ"
+        return ("an Office document" if office else "a zip archive"), "unpack it and give the mesh inside"
+    for mark, what, remedy in _MAGIC:
+        if content.startswith(mark):
+            return what, remedy
+    if content[344:348] in _NIFTI or content[4:8] == b"n+2\0":
+        return "a NIfTI volume", "name it .nii"
+    if content[128:132] == b"DICM":
+        return "a DICOM image", "segment the scan and give the label volume or its surface"
+    if content[257:262] == b"ustar":
+        return "a tar archive", "unpack it and give the mesh inside"
+    if start.startswith(b"{") and b'"asset"' in content:
+        return "glTF as text", "save it as GLB"
+    if start.startswith(b"<") and (name := _root(start)):
+        return _ROOTS.get(name, (f"an XML file ('{name}')", "save the surface as STL, PLY or OBJ"))
+    return None
+
+
+def _root(markup: bytes) -> str:
+    """The name of the outermost element."""
+    while before := _BEFORE_ROOT.match(markup):
+        markup = markup[before.end() :]
+    root = _ROOT.match(markup)
+    return "" if root is None else root[1].decode("ascii", "replace").casefold()
+
+
+def refuse_foreign(name: str, content: bytes, known: str) -> InputError:
+    """The error of a file that is no mesh: what it is, and what to do.
+
+    Args:
+        name: of the file.
+        content: of the file.
+        known: what could be read instead, as ``.stl, .ply``.
+    """
+    if content.startswith(b"\x1f\x8b") and (inner := _unpacked(content)) and (what := foreign(inner)):
+        return InputError(f"{name} is {what[0]}, compressed with gzip; unpack it, then {what[1]}")
+    if told := foreign(content):
+        return InputError(f"{name} is {told[0]}; {told[1]}")
+    if not content.strip(b"\0"):
+        return InputError(f"{name} holds nothing but zeros, so it was not copied whole; copy it again")
+    ending = Path(name).suffix.lower()
+    if ending.removeprefix(".") not in MESHES:
+        return InputError(f"{name} is not one of {known}; convert it first")
+    shown = content[:40].decode("utf-8", "replace").split("\n")[0].strip()
+    begins = (
+        f"it begins with '{shown}'" if is_text(content) and shown else "its content is of no known format"
+    )
+    return InputError(f"{name} is no {MESHES[ending[1:]]} file ({begins}); export it again")
+
+
+def _unpacked(content: bytes) -> bytes:
+    """The start of what gzip packed; empty where that cannot be read."""
+    try:
+        return zlib.decompressobj(16 + zlib.MAX_WBITS).decompress(content, 1 << 16)
+    except (zlib.error, EOFError, gzip.BadGzipFile):
+        return b""

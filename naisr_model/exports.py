@@ -1,0 +1,50 @@
+"""Surfaces as the bytes of a mesh file, each format by its own convention.
+
+STL, PLY, OBJ and VTP hold millimetres in the frame of the atlas, z up. GLB holds metres with y up, as glTF
+2.0 says ("Coordinate System and Units"), so that other programs show it upright and in its size.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import trimesh
+
+MeshFormat = Literal["stl", "ply", "obj", "vtp", "glb"]
+FORMATS: tuple[MeshFormat, ...] = ("stl", "ply", "obj", "vtp", "glb")
+"""The formats that are written, by their endings."""
+
+GLB_TO_MM: NDArray[np.float64] = np.array(
+    [[1000.0, 0, 0, 0], [0, 0, -1000.0, 0], [0, 1000.0, 0, 0], [0, 0, 0, 1.0]]
+)
+"""4x4, metres with y up to millimetres with z up: ``(x, y, z) -> 1000 (x, -z, y)``."""
+
+
+def mesh_bytes(mesh_mm: trimesh.Trimesh, ending: MeshFormat) -> bytes:
+    """A surface in millimetres, z up, as the content of a file."""
+    if ending == "vtp":
+        return _vtp(mesh_mm)
+    if ending == "glb":
+        mesh_mm = mesh_mm.copy()
+        mesh_mm.apply_transform(np.linalg.inv(GLB_TO_MM))
+    content = mesh_mm.export(file_type=ending)
+    return content.encode() if isinstance(content, str) else bytes(content)
+
+
+def _vtp(mesh_mm: trimesh.Trimesh) -> bytes:
+    """Written to memory: VTK ends the whole process where a disk is full."""
+    import pyvista
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
+
+    surface = pyvista.PolyData.from_regular_faces(np.asarray(mesh_mm.vertices, np.float32), mesh_mm.faces)
+    surface.point_data.active_normals = np.asarray(mesh_mm.vertex_normals, np.float32)
+    writer = vtkXMLPolyDataWriter()
+    writer.SetInputData(surface)
+    writer.SetDataModeToBinary()
+    writer.WriteToOutputStringOn()
+    writer.Write()
+    return str(writer.GetOutputString()).encode()
