@@ -85,7 +85,7 @@ def transfer(
     """Show a patient's shape at other covariates, as it is expected on another day."""
     from naisr_model.patients.evolution import parsed
 
-    fitted, intake = _fitted(patient, _transferable(atlas), reading)
+    fitted, intake = _forecastable(patient, atlas, reading)
     moved = fitted.at(parsed(fitted.individual.atlas, pairs("--to", to)))
     _tell_series(fitted, intake, [fitted.individual, moved], out, json_file)
 
@@ -116,7 +116,7 @@ def evolve(
     """Follow a patient's shape along one covariate."""
     from naisr_model.patients.evolution import evolution
 
-    fitted, intake = _fitted(patient, _transferable(atlas), reading)
+    fitted, intake = _forecastable(patient, atlas, reading)
     _tell_series(fitted, intake, evolution(fitted, along, start, stop, steps, path), out, json_file)
 
 
@@ -137,9 +137,18 @@ def _transferable(atlas: Path) -> Any:
     return loaded
 
 
+def _forecastable(patient: Path, atlas: Path, reading: IntakeOptions) -> tuple[Any, Any]:
+    """As :func:`_fitted`, of somebody who may be shown at other covariates."""
+    fitted, intake = _fitted(patient, _transferable(atlas), reading)
+    if not fitted.is_valid:
+        raise InputError("; ".join(fitted.remarks))
+    return fitted, intake
+
+
 def _fitted(patient: Path, loaded: Any, reading: IntakeOptions) -> tuple[Any, Any]:
     """The fit, and how the file was brought into the frame of the atlas."""
     from naisr_model.patients.evolution import parsed
+    from naisr_model.patients.fitting import fitted_in_place
     from naisr_model.patients.intake import take_in
 
     options = dataclasses.asdict(reading)
@@ -150,8 +159,7 @@ def _fitted(patient: Path, loaded: Any, reading: IntakeOptions) -> tuple[Any, An
     for sentence in intake.sentences:
         print(f"naisr: {sentence}", file=sys.stderr)
     with bar("fitting") as progress:
-        fitted = loaded.fit(intake.patient.mesh_mm, known, progress=progress)
-    return fitted, intake
+        return fitted_in_place(intake, loaded, known, progress=progress)
 
 
 def _tell_fit(fitted: Any, alternatives: Sequence[Mapping[str, Any]]) -> None:
