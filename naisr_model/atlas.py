@@ -80,7 +80,8 @@ WORTH_TELLING = 0.05
 """Least probability of an alternative that is told."""
 
 MISSED_SHARE = 0.01
-"""Of the atlas's unit of length, about half of its largest shape: a residual beyond it is no good fit."""
+"""Of the atlas's unit of length, about half of its largest shape: with a residual beyond it a fit is not
+valid. Of airways and bodies that lie in place it is a twentieth of that."""
 
 UNTOLD_SHARE = 0.5
 """An interval wider than this share of the observed range says that the shape hardly tells the covariate."""
@@ -586,14 +587,23 @@ class Fit:
         return self.individual.posterior.problem.prior.lasting
 
     @property
+    def is_valid(self) -> bool:
+        """Whether the shape was met at all: nothing else that is told means anything otherwise.
+
+        This is where it is decided that something is not such a shape as the atlas knows, or does not lie
+        as they do.
+        """
+        return self.residual_mm <= MISSED_SHARE * self.individual.atlas.frame.scale_mm
+
+    @property
     def remarks(self) -> tuple[str, ...]:
-        """A sentence on each covariate that the shape does not settle, and on a shape that was missed."""
-        sentences = []
-        if self.residual_mm > MISSED_SHARE * self.individual.atlas.frame.scale_mm:
-            sentences.append(
-                f"the fitted surface is {self.residual_mm:,.1f} mm from the scan on average: "
-                f"check the alignment{' and the known covariates' if self.covariates else ''}"
+        """A sentence on each covariate that the shape does not settle, or one on a shape that was missed."""
+        if not self.is_valid:
+            return (
+                f"not valid: the fitted surface is {self.residual_mm:,.1f} mm from the scan on average; align "
+                "it to the atlas, and check that it is such a shape",
             )
+        sentences = []
         for covariate in self.individual.atlas.covariates:
             low, high = self.intervals.get(covariate.name, (0.0, 0.0))
             extent = covariate.range[1] - covariate.range[0]

@@ -92,7 +92,7 @@ def transfer(
     loaded = _transferable(atlas)
     wanted = read_values("--to", [to], loaded.covariates)
     loaded.complete(wanted)  # refused before the fit
-    fitted, intake = _fitted(patient, loaded, reading)
+    fitted, intake = _forecastable(patient, loaded, reading)
     _tell_series(fitted, intake, [fitted.individual, fitted.at(wanted)], patient, out, json_file)
 
 
@@ -127,7 +127,7 @@ def evolve(
     _require_own(out, patient)
     loaded, way = _transferable(atlas), (along, start, stop, steps, path)
     require_way(loaded, *way)  # refused before the fit
-    fitted, intake = _fitted(patient, loaded, reading)
+    fitted, intake = _forecastable(patient, loaded, reading)
     _tell_series(fitted, intake, evolution(fitted, *way), patient, out, json_file)
 
 
@@ -156,9 +156,18 @@ def _transferable(atlas: Path) -> Any:
     return loaded
 
 
+def _forecastable(patient: Path, loaded: Any, reading: IntakeOptions) -> tuple[Any, Any]:
+    """As :func:`_fitted`, of somebody who may be shown at other covariates."""
+    fitted, intake = _fitted(patient, loaded, reading)
+    if not fitted.is_valid:
+        raise InputError("; ".join(fitted.remarks))
+    return fitted, intake
+
+
 def _fitted(patient: Path, loaded: Any, reading: IntakeOptions) -> tuple[Any, Any]:
     """The fit, and how the file was brought into the frame of the atlas."""
     from naisr_model.covariates import read_values
+    from naisr_model.patients.fitting import fitted_in_place
     from naisr_model.patients.intake import take_in
 
     options = dataclasses.asdict(reading)
@@ -170,8 +179,7 @@ def _fitted(patient: Path, loaded: Any, reading: IntakeOptions) -> tuple[Any, An
     for sentence in intake.sentences:
         say(f"naisr: {sentence}")
     with bar("fitting") as progress:
-        fitted = loaded.fit(intake.patient.mesh_mm, known, progress=progress)
-    return fitted, intake
+        return fitted_in_place(intake, loaded, known, progress=progress)
 
 
 def _tell_fit(fitted: Any, alternatives: Sequence[Mapping[str, Any]]) -> None:

@@ -32,6 +32,7 @@ def fit_record(fit: Fit) -> dict[str, Any]:
         "inferred": list(fit.inferred),
         "intervals": {name: list(ends) for name, ends in fit.intervals.items()},
         "alternatives": [dataclasses.asdict(one) for one in fit.alternatives],
+        "is_valid": fit.is_valid,
         "remarks": list(fit.remarks),
         "residual_mm": fit.residual_mm,
         "lasting": fit.lasting if can.transferable else None,

@@ -14,11 +14,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import trimesh
 
 from naisr_model.atlas import Atlas
 from naisr_model.covariates import Values
 from naisr_model.data import volumes
-from naisr_model.data.align import Landmarks, Method, Proposal, propose, read_landmarks
+from naisr_model.data.align import (
+    Landmarks,
+    Method,
+    Proposal,
+    closest_motion,
+    propose,
+    read_landmarks,
+)
 from naisr_model.data.markups import Space
 from naisr_model.data.patients import (
     PatientShape,
@@ -31,6 +39,12 @@ from naisr_model.data.patients import (
 from naisr_model.data.remarks import Remark, gravest_first
 from naisr_model.errors import InputError
 from naisr_model.progress import SILENT, Progress
+
+ASTRAY_POINTS, ASTRAY_PLACES = 200, 12
+"""On how many points, and at how many places along the first covariate, a scan's distance is judged."""
+
+ASTRAY_SHARE = 0.05
+"""Of the atlas's unit of length: a scan farther from every average shape does not lie as they do."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +164,7 @@ def read(path: Path, atlas: Atlas, label: int | str | None = None, scale: float 
         InputError: when the file cannot be read, or cannot be used whatever its unit and place.
     """
     patient = repaired(_in_units(read_patient(path, label), scale), atlas.frame)
-    found = check_patient(patient, atlas.frame)
+    found = _found(patient, atlas)
     _refuse(path.name, (remark for remark in found if remark.topic not in ("far", "units")))
     return Intake(patient, found)
 
@@ -183,7 +197,43 @@ def aligned(
     _refuse(intake.patient.source, (remark for remark in intake.found if remark.topic == "units"))
     proposal = _proposal(intake.patient, atlas, known, method, points, progress)
     patient = moved(intake.patient, proposal.transform)
-    return Intake(patient, check_patient(patient, atlas.frame), method, proposal)
+    return Intake(patient, _found(patient, atlas), method, proposal)
+
+
+def relaid(intake: Intake, atlas: Atlas, shape_mm: trimesh.Trimesh, progress: Progress = SILENT) -> Intake:
+    """A patient that was aligned laid onto another shape, as the one that was fitted, by closest points.
+
+    Raises:
+        Cancelled: when nobody waits any more.
+    """
+    patient = moved(intake.patient, closest_motion(intake.patient.mesh_mm, shape_mm, progress))
+    return replace(intake, patient=patient, found=_found(patient, atlas))
+
+
+def _found(patient: PatientShape, atlas: Atlas) -> tuple[Remark, ...]:
+    """What is the matter with a patient as it lies."""
+    found = check_patient(patient, atlas.frame)
+    if any(remark.severity == "refuse" for remark in found):
+        return found
+    away_mm = _away_mm(patient.mesh_mm, atlas)
+    if away_mm <= ASTRAY_SHARE * atlas.frame.scale_mm:
+        return found
+    sentence = f"the shape is {away_mm:.0f} mm from the nearest of the atlas's average shapes on average"
+    remedy = "align it to the atlas (icp or landmarks) before it is fitted, or check that it is such a shape"
+    return gravest_first((*found, Remark("look", "astray", sentence, remedy)))
+
+
+def _away_mm(mesh_mm: trimesh.Trimesh, atlas: Atlas) -> float:
+    """Mean distance of points of a shape to the nearest of some average shapes along the population."""
+    vertices_mm = np.asarray(mesh_mm.vertices, np.float64)
+    points_mm = vertices_mm[np.random.default_rng(0).permutation(len(vertices_mm))[:ASTRAY_POINTS]]
+    rows = np.flatnonzero(~atlas.population.held_out)
+    order = rows[np.argsort(atlas.population.values[rows, :1].sum(axis=1), kind="stable")]
+    places = order[np.linspace(0, len(order) - 1, ASTRAY_PLACES).round().astype(int)]
+    return min(
+        float(np.abs(atlas.sdf(points_mm, atlas.population.row(place), extrapolate=True)).mean())
+        for place in dict.fromkeys(places.tolist())
+    )
 
 
 def _landmarks(align: Method, path: Path | None, space: Space) -> Landmarks:
