@@ -600,8 +600,8 @@ class Fit:
         """A sentence on each covariate that the shape does not settle, or one on a shape that was missed."""
         if not self.is_valid:
             return (
-                f"not valid: the fitted surface is {self.residual_mm:,.1f} mm from the scan on average; align "
-                "it to the atlas, and check that it is such a shape",
+                f"not valid: the fitted surface is {self.residual_mm:,.1f} mm from the scan on average; "
+                "align it to the atlas, and check that it is such a shape",
             )
         sentences = []
         for covariate in self.individual.atlas.covariates:

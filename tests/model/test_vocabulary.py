@@ -107,7 +107,7 @@ def test_settings_are_read_in_real_units(texts, values):
         (["age=1_0"], "'age' is '1_0'; expected a number in months"),
         (["age=1e40"], "expected a number in months"),
         (["age=nan"], "expected a number in months"),
-        (["sex=m"], "expected F or M"),
+        (["sex=x"], "expected F or M"),
     ],
 )
 def test_what_is_no_setting_is_told(texts, message):
