@@ -32,7 +32,7 @@ SYSTEM_NEEDS := \
 	libxkbcommon-x11.so.0=libxkbcommon-x11-0 libXcursor.so.1=libxcursor1
 
 .DEFAULT_GOAL := help
-.PHONY: help env system run test figures lint lock clean
+.PHONY: help env system run test fuzz figures lint lock clean
 
 help: ## say what can be done
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 16
@@ -92,6 +92,9 @@ run: env ## open the viewer; without a display, write pictures and meshes into o
 
 test: lint ## check format, style and types, then run the tests
 	@$(BIN)/pytest $(PYTEST_ARGS)
+
+fuzz: env ## try broken inputs of every kind, some minutes, and count in the results how they end
+	@$(BIN)/pytest -m fuzz tests/corpus --counts resources/docs/results.md $(PYTEST_ARGS)
 
 figures: env ## make the pictures of the window in the documents anew
 	@$(BIN)/python -m naisr_viewer.program.figures resources

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import trimesh
-from numpy.random import Generator
-
 from corpus import damage, shapes
 from corpus.case import OUT, REFUSED, Case, Damage, Ending, Expected, Files, Goods, Special, within
+from numpy.random import Generator
 
 KIND = "checkpoint"
 FILE = "eggs.safetensors"
@@ -57,7 +56,9 @@ def packed(header: Record, body: bytes) -> bytes:
     return struct.pack("<Q", len(text)) + text + body
 
 
-def _record(name: str, change: Callable[[Record], object], words: tuple[str, ...] = MESH, ending: Ending = "refused") -> Case:
+def _record(
+    name: str, change: Callable[[Record], object], words: tuple[str, ...] = MESH, ending: Ending = "refused"
+) -> Case:
     """The description of the atlas changed, and nothing that could tell so kept beside it."""
 
     def make(goods: Goods, _rng: Generator) -> Files:
@@ -143,10 +144,17 @@ _BYTES = [
     _bytes("zeros in the header", lambda content, _rng: content[:100] + bytes(50) + content[150:]),
     _bytes("zeros in the tensors", lambda content, _rng: content[:-3000] + bytes(3000), ending="either"),
     _bytes("packed", damage.gzipped),
-    *(_bytes(what, lambda _content, _rng, other=other: other, words=words) for what, other in damage.STRANGERS.items() for words in (INFO,)),
+    *(
+        _bytes(what, lambda _content, _rng, other=other: other, words=words)
+        for what, other in damage.STRANGERS.items()
+        for words in (INFO,)
+    ),
     _bytes("a mesh", lambda _content, _rng: shapes.stl(shapes.triangles()), words=INFO),
     _bytes("a table", lambda _content, _rng: b"mesh,subject,age\na.stl,A,1\n", words=FIT),
-    _bytes("a pickle", lambda _content, _rng: b"\x80\x04\x95\x1e\x00\x00\x00\x00\x00\x00\x00\x8c\x05posix\x8c\x06system\x93\x8c\x0atouch pwned\x85R."),
+    _bytes(
+        "a pickle",
+        lambda _content, _rng: b"\x80\x04\x8c\x05posix\x8c\x06system\x93\x8c\x0btouch pwned\x85R.",
+    ),
     _bytes("a huge length", lambda content, _rng: b"\xff" * 8 + content[8:]),
     _bytes("a length of 99 MB", lambda content, _rng: struct.pack("<Q", 99_000_000) + content[8:]),
 ]
@@ -157,26 +165,57 @@ _HEADERS = [
     _header("no JSON", _put("__metadata__", "record", value="{")),
     _header("a list", _put("__metadata__", "record", value="[]")),
     _header("nesting", _put("__metadata__", "record", value="[" * 100_000 + "]" * 100_000)),
-    *(_header(f"version {version}", _put("__metadata__", "version", value=version)) for version in ("99", "abc", "-1", "", "1.5")),
+    *(
+        _header(f"version {version}", _put("__metadata__", "version", value=version))
+        for version in ("99", "abc", "-1", "", "1.5")
+    ),
     _header("a number for a description", _put("__metadata__", "record", value="7")),
 ]
 _POPULATION = ("population",)
 _RECORDS = [
-    *(_record(f"{'.'.join(map(str, path))} missing", _drop(*path)) for path in (("preset",), ("population",), ("frame",), ("alignment",), ("frame", "scale_mm"), ("population", "covariates"), ("population", "values"), ("preset", "model"))),
-    *(_record(f"a scale of {value}", _put("frame", "scale_mm", value=value)) for value in (0, -40.0, float("nan"), float("inf"), "wide", None, 1e308)),
+    *(
+        _record(f"{'.'.join(map(str, path))} missing", _drop(*path))
+        for path in (
+            ("preset",),
+            ("population",),
+            ("frame",),
+            ("alignment",),
+            ("frame", "scale_mm"),
+            ("population", "covariates"),
+            ("population", "values"),
+        )
+    ),
+    *(
+        _record(f"a scale of {value}", _put("frame", "scale_mm", value=value))
+        for value in (0, -40.0, float("nan"), float("inf"), "wide", None, 1e308)
+    ),
     _record("a scale of 0, fit", _put("frame", "scale_mm", value=0), FIT),
     _record("a centre of two", _put("frame", "centre_mm", value=[0.0, 0.0])),
     _record("a centre of nan", _put("frame", "centre_mm", value=[float("nan"), 0.0, 0.0]), FIT),
+    _record("no model", _drop("preset", "model"), ending="either"),
     _record("another model", _put("preset", "model", value="magic")),
     _record("a model that is a list", _put("preset", "model", value=[])),
-    *(_record(f"{size} wide", _put("preset", "network", "template", "width", value=size)) for size in (0, -8, 64, 10**9, "32")),
-    *(_record(f"{size} hidden", _put("preset", "network", "template", "hidden", value=size)) for size in (-1, 5, 10**7)),
-    *(_record(f"a code of {size}", _put("preset", "network", "latent", value=size)) for size in (0, -4, 5, 10**9)),
+    *(
+        _record(f"{size} wide", _put("preset", "network", "template", "width", value=size))
+        for size in (0, -8, 64, 10**9, "32")
+    ),
+    *(
+        _record(f"{size} hidden", _put("preset", "network", "template", "hidden", value=size))
+        for size in (-1, 5, 10**7)
+    ),
+    *(
+        _record(f"a code of {size}", _put("preset", "network", "latent", value=size))
+        for size in (0, -4, 5, 10**9)
+    ),
     *(_record(f"{size} dimensions", _put("preset", "network", "dim", value=size)) for size in (0, 2, 4, 300)),
     _record("an unknown setting", _put("preset", "network", "colour", value=3)),
     _record("no covariates", _put("population", "covariates", value=[])),
-    _record("a covariate twice", lambda r: r["population"]["covariates"].append(r["population"]["covariates"][0])),
-    _record("covariates in another order", lambda r: r["population"]["covariates"].reverse(), ending="either"),
+    _record(
+        "a covariate twice", lambda r: r["population"]["covariates"].append(r["population"]["covariates"][0])
+    ),
+    _record(
+        "covariates in another order", lambda r: r["population"]["covariates"].reverse(), ending="either"
+    ),
     _record("a covariate of scale 0", _put("population", "covariates", 0, "scale", value=0.0)),
     _record("a covariate of scale nan", _put("population", "covariates", 0, "scale", value=float("nan"))),
     _record("a covariate of centre nan", _put("population", "covariates", 0, "centre", value=float("nan"))),
@@ -185,10 +224,20 @@ _RECORDS = [
     _record("an unknown kind", _put("population", "covariates", 0, "kind", value="ordinal")),
     _record("one level", _put("population", "covariates", 1, "levels", value=["F"])),
     _record("a name that is a number", _put("population", "covariates", 0, "name", value=5)),
-    *(_record(f"short {column}", lambda r, column=column: r["population"][column].pop()) for column in ("subjects", "visits", "values", "held_out")),
-    _record("values of one column", lambda r: r["population"].update(values=[[row[0]] for row in r["population"]["values"]])),
+    *(
+        _record(f"short {column}", _drop("population", column, 0))
+        for column in ("subjects", "visits", "values", "held_out")
+    ),
+    _record(
+        "values of one column",
+        lambda r: r["population"].update(values=[[row[0]] for row in r["population"]["values"]]),
+    ),
     _record("a value of nan", _put("population", "values", 0, 0, value=float("nan"))),
-    _record("everybody held out", lambda r: r["population"].update(held_out=[True] * len(r["population"]["held_out"])), FIT),
+    _record(
+        "everybody held out",
+        lambda r: r["population"].update(held_out=[True] * len(r["population"]["held_out"])),
+        FIT,
+    ),
     _record("an unknown alignment", _put("alignment", "method", value="magic"), INFO),
     _record("an alignment of nothing", _put("alignment", value=None)),
     _record("deep nesting", _nested, INFO, "either"),
@@ -200,12 +249,12 @@ _TENSORS = [
     _tensor(f"{value}", which, value, words)
     for which, value, words in (
         *((0, np.nan, MESH), (2, np.nan, MESH), (5, np.inf, MESH), (0, np.nan, FIT), (0, np.inf, INFO)),
-        *((-1, np.nan, MESH), (0, 1e38, MESH)),
+        *((-3, np.nan, MESH), (-3, 1e38, MESH)),
     )
 ]
 
 
-def _shapes(name: str, change: Callable[[Mapping[str, Record], str], object]) -> Case:
+def _shapes(name: str, change: Callable[[Record, str], object]) -> Case:
     """The first tensor announced otherwise."""
 
     def alter(header: Record) -> None:
@@ -216,13 +265,15 @@ def _shapes(name: str, change: Callable[[Mapping[str, Record], str], object]) ->
 
 
 _ANNOUNCED = [
-    _shapes("of another shape", lambda header, key: header[key].update(shape=header[key]["shape"][::-1] + [1])),
+    _shapes("of another shape", lambda header, key: header[key].update(shape=[*header[key]["shape"], 1])),
     _shapes("of another type", lambda header, key: header[key].update(dtype="I32")),
     _shapes("of an unknown type", lambda header, key: header[key].update(dtype="F99")),
     _shapes("that overlaps", lambda header, key: header[key].update(data_offsets=[0, 4])),
-    _shapes("that is missing", lambda header, key: header.pop(key)),  # type: ignore[attr-defined]
-    _shapes("with another name", lambda header, key: header.update({"weights.x": header.pop(key)})),  # type: ignore[attr-defined]
-    _shapes("beyond the end", lambda header, key: header[key].update(data_offsets=[0, 10**15], shape=[10**14])),
+    _shapes("that is missing", lambda header, key: header.pop(key)),
+    _shapes("with another name", lambda header, key: header.update({"weights.x": header.pop(key)})),
+    _shapes(
+        "beyond the end", lambda header, key: header[key].update(data_offsets=[0, 10**15], shape=[10**14])
+    ),
 ]
 
 

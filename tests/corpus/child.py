@@ -6,7 +6,6 @@ import faulthandler
 import os
 import sys
 import tempfile
-import time
 import traceback
 import warnings
 from collections.abc import Iterator
@@ -45,7 +44,6 @@ class Report:
         out: standard output.
         err: standard error.
         peak_mb: most memory that the process held meanwhile.
-        seconds: that it took.
     """
 
     code: int | None
@@ -53,7 +51,6 @@ class Report:
     out: str
     err: str
     peak_mb: float
-    seconds: float
 
 
 def serve(connection: Connection, home: Path) -> None:
@@ -61,8 +58,13 @@ def serve(connection: Connection, home: Path) -> None:
     os.environ |= {"OMP_NUM_THREADS": "1", "HOME": str(home), "XDG_CACHE_HOME": str(home / "cache")}
     # A process of its own says each warning once; this one has to say it of every case.
     warnings.simplefilter("always")
-    while (job := connection.recv()) is not None:
-        connection.send(_run(job, home))
+    for unseen in (DeprecationWarning, PendingDeprecationWarning, ImportWarning, ResourceWarning):
+        warnings.simplefilter("ignore", unseen)
+    try:
+        while (job := connection.recv()) is not None:
+            connection.send(_run(job, home))
+    except EOFError:
+        return  # whoever asked is gone
 
 
 def _run(job: Job, home: Path) -> Report:
@@ -70,7 +72,7 @@ def _run(job: Job, home: Path) -> Report:
     os.environ["TMPDIR"] = str(job.scratch)
     tempfile.tempdir = None
     _forget_peak()
-    started, trace, code = time.monotonic(), "", None
+    trace, code = "", None
     with _captured(home) as told:
         faulthandler.enable(2)
         try:
@@ -78,7 +80,7 @@ def _run(job: Job, home: Path) -> Report:
         except BaseException:
             trace = traceback.format_exc()
     out, err = told
-    return Report(code, trace, out, err, _peak_mb(), time.monotonic() - started)
+    return Report(code, trace, out, err, _peak_mb())
 
 
 def _called(job: Job) -> int:

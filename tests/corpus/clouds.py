@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import cache, partial
 
 import numpy as np
-from numpy.random import Generator
-from numpy.typing import NDArray
-
 from corpus import damage, shapes
-from corpus.case import REFUSED, Case, Damage, Ending, Expected, Files, Goods
-from corpus.fits import case, is_part, part
+from corpus.case import REFUSED, Case, Damage, Expected
+from corpus.fits import case, part
+from numpy.typing import NDArray
 
 KIND = "cloud"
 _cloud = partial(case, KIND)
@@ -23,7 +20,14 @@ def points() -> NDArray[np.float64]:
     return shapes.triangles().points[::2]
 
 
-def text(mark: str = ",", header: str = "", number: str = "{:.5f}", end: str = "\n", order: str = "xyz", more: str = "") -> bytes:
+def text(
+    mark: str = ",",
+    header: str = "",
+    number: str = "{:.5f}",
+    end: str = "\n",
+    order: str = "xyz",
+    more: str = "",
+) -> bytes:
     """A line a point."""
     columns = ["xyz".index(axis) for axis in order]
     rows = [mark.join(number.format(point[i]) for i in columns) + more for point in points()]
@@ -46,7 +50,17 @@ def _changed(row: int, line: str) -> bytes:
 
 _TEXT = text()
 _WRITTEN = [
-    *(_good(f"{name}, {ending}", text(mark), file=f"egg.{ending}") for name, mark in (("commas", ","), ("semicolons", ";"), ("tabs", "\t"), ("spaces", " "), ("wide spaces", "   ")) for ending in ("csv", "xyz")),
+    *(
+        _good(f"{name}, {ending}", text(mark), file=f"egg.{ending}")
+        for name, mark in (
+            ("commas", ","),
+            ("semicolons", ";"),
+            ("tabs", "\t"),
+            ("spaces", " "),
+            ("wide spaces", "   "),
+        )
+        for ending in ("csv", "xyz")
+    ),
     _good("capital .CSV", _TEXT, file="EGG.CSV"),
     _good("a header", text(header="x,y,z")),
     _good("a header in capitals", text(header="X,Y,Z")),
@@ -72,7 +86,12 @@ _WRITTEN = [
     _good("a remark in Latin-1", b"# R\xf6hre\n" + _TEXT),
     _good("every point twice", _TEXT + _TEXT),
     _good("metres", "\n".join(",".join(map(repr, (p / 1000).tolist())) for p in points()).encode()),
-    _cloud("the count first", "egg.xyz", lambda: f"{len(points())}\nan egg\n".encode() + text(" "), part("either")),
+    _cloud(
+        "the count first",
+        "egg.xyz",
+        lambda: f"{len(points())}\nan egg\n".encode() + text(" "),
+        part("either"),
+    ),
     _cloud("spaces within decimal commas", "egg.csv", lambda: _commas(", "), part("either")),
     _cloud("decimal commas and commas", "egg.csv", lambda: _commas(","), REFUSED),
     _cloud("UTF-16 without a mark", "egg.csv", lambda: _TEXT.decode().encode("utf-16-le"), part("either")),
@@ -81,10 +100,16 @@ _BROKEN = [
     *(
         _cloud(name, "egg.csv", lambda line=line: _changed(5, line), REFUSED)
         for name, line in {
-            "two numbers": "1,2", "a word": "1,2,three", "nan": "nan,nan,nan", "inf": "1,2,inf", "1e308": "1,2,1e308",
-            "an empty cell": "1,,3", "a NUL": "1,2,\x003", "a point far away": "1,2,900000",
+            "two numbers": "1,2",
+            "a word": "1,2,three",
+            "nan": "nan,nan,nan",
+            "inf": "1,2,inf",
+            "1e308": "1,2,1e308",
+            "an empty cell": "1,,3",
+            "a NUL": "1,2,\x003",
         }.items()
     ),
+    _cloud("a point far away", "egg.csv", lambda: _changed(5, "1,2,900000"), part("either", "far|away|from")),
     _cloud("a header without z", "egg.csv", lambda: text(header="x,y,w"), REFUSED),
     _cloud("x twice", "egg.csv", lambda: text(header="x,y,z,x", more=",99"), REFUSED),
     _cloud("two columns", "egg.csv", lambda: text(order="xy"), REFUSED),
@@ -92,10 +117,16 @@ _BROKEN = [
     _cloud("a header alone", "egg.csv", lambda: b"x,y,z\n", REFUSED),
     _cloud("all alike", "egg.csv", lambda: b"1,2,3\n" * 300, REFUSED),
     _cloud("on a line", "egg.csv", lambda: "".join(f"{i},0,0\n" for i in range(300)).encode(), REFUSED),
-    *(_cloud(what, "egg.csv", lambda content=content: content, REFUSED) for what, content in damage.STRANGERS.items()),
-    *(_cloud(f"cut at {share}", "egg.csv", lambda: _TEXT, part("either"), damage.cut(share)) for share in (0.01, 0.4, 0.9)),
+    *(
+        _cloud(what, "egg.csv", lambda content=content: content, REFUSED)
+        for what, content in damage.STRANGERS.items()
+    ),
+    *(
+        _cloud(f"cut at {share}", "egg.csv", lambda: _TEXT, part("either"), damage.cut(share))
+        for share in (0.01, 0.4, 0.9)
+    ),
     *(_cloud(f"flips {turn}", "egg.csv", lambda: _TEXT, part("either"), damage.flip(4)) for turn in "abc"),
     _cloud("swapped blocks", "egg.csv", lambda: _TEXT, Expected("either"), damage.swap(100)),
     _cloud("zeros within", "egg.csv", lambda: _TEXT, REFUSED, damage.zeros(60)),
-]  # fmt: skip
+]
 CASES = (*_WRITTEN, *_BROKEN)

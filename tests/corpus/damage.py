@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import gzip
 
-from numpy.random import Generator
-
 from corpus.case import Damage
+from numpy.random import Generator
 
 
 def cut(share: float) -> Damage:
@@ -118,7 +117,7 @@ STRANGERS = {
     "nothing": b"",
     "one byte": b"\n",
     "zeros": bytes(4096),
-    "a web page": b"<!DOCTYPE html>\n<html><head><title>404 Not Found</title></head><body>gone</body></html>\n",
+    "a web page": b"<!DOCTYPE html>\n<html><head><title>404</title></head><body>gone</body></html>\n",
     "a zip": b"PK\x03\x04\x14\x00\x00\x00\x08\x00" + bytes(range(256)) * 4,
     "a picture": b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR\x00\x00\x01\x00" + bytes(range(256)) * 4,
     "a text": b"Dear colleague,\nplease find the scan attached.\nKind regards\n",

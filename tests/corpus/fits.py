@@ -8,9 +8,8 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from numpy.random import Generator
-
 from corpus.case import RECORD, Case, Damage, Ending, Expected, Files, Goods, Special, single, within
+from numpy.random import Generator
 
 KNOWN = ("--known", "age=6,sex=M")
 FAR_MM = 1.0

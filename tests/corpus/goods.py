@@ -9,6 +9,7 @@ from pathlib import Path
 from corpus import tables
 from corpus.case import Goods, place
 from corpus.runner import contents
+
 from naisr_model import checkpoint
 from naisr_model.cli import main
 from naisr_model.data.align import Alignment

@@ -7,20 +7,39 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache
+from typing import Any, Literal
 
 import numpy as np
 from eggs import egg
 from numpy.typing import NDArray
 
 SPACING_MM = (1.5, 1.5, 2.5)
+Order = Literal["<", ">"]
 _COUNTS = (37, 35, 33)
 _NIFTI_TYPES = {
-    "u1": 2, "i2": 4, "i4": 8, "f4": 16, "f8": 64, "i1": 256, "u2": 512, "u4": 768, "i8": 1024, "u8": 1280,
-}  # fmt: skip
+    "u1": 2,
+    "i2": 4,
+    "i4": 8,
+    "f4": 16,
+    "f8": 64,
+    "i1": 256,
+    "u2": 512,
+    "u4": 768,
+    "i8": 1024,
+    "u8": 1280,
+}
 _NRRD_TYPES = {
-    "u1": "unsigned char", "i1": "signed char", "u2": "unsigned short", "i2": "short", "u4": "unsigned int",
-    "i4": "int", "u8": "unsigned long long", "i8": "long long", "f4": "float", "f8": "double",
-}  # fmt: skip
+    "u1": "unsigned char",
+    "i1": "signed char",
+    "u2": "unsigned short",
+    "i2": "short",
+    "u4": "unsigned int",
+    "i4": "int",
+    "u8": "unsigned long long",
+    "i8": "long long",
+    "f4": "float",
+    "f8": "double",
+}
 
 
 @cache
@@ -86,7 +105,7 @@ class Nifti:
     inter: float = 0.0
     units: int = 2
     dims: Sequence[int] | None = None
-    order: str = "<"
+    order: Order = "<"
     version: int = 1
     magic: bytes | None = None
 
@@ -119,34 +138,50 @@ class Nifti:
         dims, code, bits, pixdim = self._common(voxels)
         e = self.order
         parts = [
-            struct.pack(f"{e}i36x", 348), struct.pack(f"{e}8h", *dims), bytes(14),
-            struct.pack(f"{e}hhh", code, bits, 0), struct.pack(f"{e}8f", *pixdim),
-            struct.pack(f"{e}fff", 352.0, self.slope, self.inter), struct.pack(f"{e}hbB", 0, 0, self.units),
-            bytes(4 * 6 + 80 + 24), struct.pack(f"{e}hh", *self._codes()),
-            struct.pack(f"{e}6f", *self._quaternion()), struct.pack(f"{e}12f", *self._forms()),
-            bytes(16), self.magic or b"n+1\0",
-        ]  # fmt: skip
+            struct.pack(f"{e}i36x", 348),
+            struct.pack(f"{e}8h", *dims),
+            bytes(14),
+            struct.pack(f"{e}hhh", code, bits, 0),
+            struct.pack(f"{e}8f", *pixdim),
+            struct.pack(f"{e}fff", 352.0, self.slope, self.inter),
+            struct.pack(f"{e}hbB", 0, 0, self.units),
+            bytes(4 * 6 + 80 + 24),
+            struct.pack(f"{e}hh", *self._codes()),
+            struct.pack(f"{e}6f", *self._quaternion()),
+            struct.pack(f"{e}12f", *self._forms()),
+            bytes(16),
+            self.magic or b"n+1\0",
+        ]
         return b"".join(parts)
 
     def _second(self, voxels: NDArray) -> bytes:
         dims, code, bits, pixdim = self._common(voxels)
         e = self.order
         parts = [
-            struct.pack(f"{e}i", 540), self.magic or b"n+2\0\r\n\x1a\n", struct.pack(f"{e}hh", code, bits),
-            struct.pack(f"{e}8q", *dims), bytes(24), struct.pack(f"{e}8d", *pixdim),
-            struct.pack(f"{e}q", 544), struct.pack(f"{e}dd", self.slope, self.inter),
-            bytes(8 * 4 + 8 * 2 + 80 + 24), struct.pack(f"{e}ii", *self._codes()),
-            struct.pack(f"{e}6d", *self._quaternion()), struct.pack(f"{e}12d", *self._forms()),
-            struct.pack(f"{e}iii", 0, self.units, 0), bytes(16), bytes(1 + 15),
-        ]  # fmt: skip
+            struct.pack(f"{e}i", 540),
+            self.magic or b"n+2\0\r\n\x1a\n",
+            struct.pack(f"{e}hh", code, bits),
+            struct.pack(f"{e}8q", *dims),
+            bytes(24),
+            struct.pack(f"{e}8d", *pixdim),
+            struct.pack(f"{e}q", 544),
+            struct.pack(f"{e}dd", self.slope, self.inter),
+            bytes(8 * 4 + 8 * 2 + 80 + 24),
+            struct.pack(f"{e}ii", *self._codes()),
+            struct.pack(f"{e}6d", *self._quaternion()),
+            struct.pack(f"{e}12d", *self._forms()),
+            struct.pack(f"{e}iii", 0, self.units, 0),
+            bytes(16),
+            bytes(1 + 15),
+        ]
         header = b"".join(parts)
         assert len(header) == 540, len(header)
         return header
 
 
-def nifti(voxels: NDArray | None = None, **header: object) -> bytes:
+def nifti(voxels: NDArray | None = None, **header: Any) -> bytes:
     """A NIfTI file of voxels, the egg's where none are given."""
-    return Nifti(**header).file(labels() if voxels is None else voxels)  # type: ignore[arg-type]
+    return Nifti(**header).file(labels() if voxels is None else voxels)
 
 
 def nifti_gz(voxels: NDArray | None = None) -> bytes:
@@ -158,28 +193,33 @@ def nrrd(
     voxels: NDArray | None = None,
     *,
     encoding: str = "raw",
-    order: str = "<",
+    order: Order = "<",
     drop: Sequence[str] = (),
     matrix: NDArray | None = None,
     end: str = "\n",
-    **fields: object,
+    **fields: Any,
 ) -> bytes:
     """A NRRD file; ``fields`` are more lines of the header, or other ones, with _ for a space."""
     voxels = labels() if voxels is None else voxels
     matrix = placed() if matrix is None else matrix
     axes = " ".join("(" + ",".join(f"{x:.9g}" for x in matrix[:3, i]) + ")" for i in range(3))
     told: dict[str, object] = {
-        "type": _NRRD_TYPES[voxels.dtype.str[1:]], "dimension": voxels.ndim, "space": "right-anterior-superior",
-        "sizes": " ".join(map(str, voxels.shape)), "space directions": axes,
-        "kinds": "domain domain domain", "endian": {"<": "little", ">": "big"}[order], "encoding": encoding,
+        "type": _NRRD_TYPES[voxels.dtype.str[1:]],
+        "dimension": voxels.ndim,
+        "space": "right-anterior-superior",
+        "sizes": " ".join(map(str, voxels.shape)),
+        "space directions": axes,
+        "kinds": "domain domain domain",
+        "endian": {"<": "little", ">": "big"}[order],
+        "encoding": encoding,
         "space origin": "(" + ",".join(f"{x:.9g}" for x in matrix[:3, 3]) + ")",
-    }  # fmt: skip
+    }
     told |= {name.replace("_", " "): value for name, value in fields.items()}
     lines = ["NRRD0005", *(f"{name}: {value}" for name, value in told.items() if name not in drop)]
     return (end.join(lines) + 2 * end).encode() + _packed(voxels, encoding, order)
 
 
-def _packed(voxels: NDArray, encoding: str, order: str) -> bytes:
+def _packed(voxels: NDArray, encoding: str, order: Order) -> bytes:
     body = voxels.astype(voxels.dtype.newbyteorder(order)).tobytes(order="F")
     if encoding in ("gzip", "gz"):
         return gzip.compress(body, mtime=0)
@@ -198,9 +238,9 @@ def segment(number: int, value: int, name: str, layer: int = 0) -> dict[str, obj
     return {f"Segment{number}§{key}": f"={text}" for key, text in told.items()}
 
 
-def slicer(voxels: NDArray, *segments: dict[str, object], **fields: object) -> bytes:
+def slicer(voxels: NDArray, *segments: dict[str, object], **fields: Any) -> bytes:
     """A segmentation of 3D Slicer: ``segments`` from :func:`segment`."""
     told = {key: value for each in segments for key, value in each.items()}
-    made = nrrd(voxels, **fields)  # type: ignore[arg-type]
+    made = nrrd(voxels, **fields)
     lines = "".join(f"{key.replace('§', '_')}:{text}\n" for key, text in told.items()).encode()
     return made.replace(b"\n\n", b"\n" + lines + b"\n", 1)

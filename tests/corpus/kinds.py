@@ -5,9 +5,24 @@ from __future__ import annotations
 from corpus import checkpoints, clouds, landmarks, meshes, options, settings, stores, tables, volumes, window
 from corpus.case import Case
 
-KINDS = (
+TITLES = {
+    "mesh": "meshes",
+    "volume": "label volumes",
+    "cloud": "clouds of points",
+    "table": "tables and what they name",
+    "landmarks": "landmarks",
+    "checkpoint": "atlases",
+    "store": "prepared stores",
+    "state": "half-done trainings",
+    "settings": "settings of a training",
+    "options": "options",
+    "window": "files opened in the window",
+}
+"""What is damaged, by kind of case."""
+
+_MODULES = (
     *(meshes, volumes, clouds, tables, landmarks),
     *(checkpoints, stores, settings, options, window),
 )
 
-CASES: tuple[Case, ...] = tuple(case for kind in KINDS for case in kind.CASES)
+CASES: tuple[Case, ...] = tuple(case for module in _MODULES for case in module.CASES)

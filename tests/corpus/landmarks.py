@@ -8,11 +8,10 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from numpy.random import Generator
-
 from corpus import damage, shapes, tables
 from corpus.case import RECORD, Case, Damage, Ending, Expected, Files, Goods
 from corpus.fits import KNOWN
+from numpy.random import Generator
 
 KIND = "landmarks"
 MARKS = tables.landmarks(6.0, 1.0)
@@ -48,7 +47,9 @@ def fcsv(marks: Marks) -> bytes:
 
 def markups(marks: Marks, system: str = "LPS") -> bytes:
     """What 3D Slicer writes now."""
-    points = [{"id": str(i), "label": name, "position": list(at)} for i, (name, at) in enumerate(marks.items())]
+    points = [
+        {"id": str(i), "label": name, "position": list(at)} for i, (name, at) in enumerate(marks.items())
+    ]
     made = {"type": "Fiducial", "coordinateSystem": system, "coordinateUnits": "mm", "controlPoints": points}
     return json.dumps({"markups": [made]}).encode()
 
@@ -62,7 +63,14 @@ def aligned(folder: Path) -> str:
     return "" if away < 0.5 else f"landmarks lie {away:.1f} mm from the atlas's"
 
 
-def _scan(name: str, content: bytes, ending: Ending = "success", *damages: Damage, says: str = "", file: str = "marks.csv") -> Case:
+def _scan(
+    name: str,
+    content: bytes,
+    ending: Ending = "success",
+    *damages: Damage,
+    says: str = "",
+    file: str = "marks.csv",
+) -> Case:
     """One scan aligned by a file."""
 
     def make(_goods: Goods, rng: Generator) -> Files:
@@ -72,7 +80,13 @@ def _scan(name: str, content: bytes, ending: Ending = "success", *damages: Damag
         return {"egg.stl": shapes.stl(SCAN), file: marks}
 
     words = ("fit", "egg.stl", "--atlas", "{goods}/marked.safetensors", *KNOWN, "--json", RECORD)
-    return Case(KIND, name, make, (*words, "--align", "landmarks", "--landmarks", file), Expected(ending, aligned, says))
+    return Case(
+        KIND,
+        name,
+        make,
+        (*words, "--align", "landmarks", "--landmarks", file),
+        Expected(ending, aligned, says),
+    )
 
 
 def _with(**changed: tuple[float, float, float]) -> Marks:
@@ -95,16 +109,27 @@ _SCANS = [
     _scan("a mark", b"\xef\xbb\xbf" + _LINES),
     _scan("UTF-16", _LINES, "success", damage.encoded("utf-16")),
     _scan("lines of Windows", _LINES.replace(b"\n", b"\r\n")),
-    _scan("another order of lines", text(dict(reversed(HERE.items())))),
-    _scan("another order of columns", b"x,y,z,name\n" + b"".join(f"{x},{y},{z},{n}\n".encode() for n, (x, y, z) in HERE.items())),
-    _scan("more columns", text(HERE, header="name,x,y,z,note").replace(b"\n", b",by hand\n").replace(b"note,by hand", b"note")),
+    _scan("another order of lines", text(dict(reversed(list(HERE.items()))))),
+    _scan(
+        "another order of columns",
+        b"x,y,z,name\n" + b"".join(f"{x},{y},{z},{n}\n".encode() for n, (x, y, z) in HERE.items()),
+    ),
+    _scan(
+        "more columns",
+        text(HERE, header="name,x,y,z,note").replace(b"\n", b",by hand\n").replace(b"note,by hand", b"note"),
+    ),
     _scan("one more landmark", text(_with(ear=(1.0, 2.0, 3.0)))),
     _scan("four of five", text({k: v for k, v in HERE.items() if k != "left"})),
     _scan("empty lines", _LINES.replace(b"\n", b"\n\n")),
     _scan("names in capitals", text({k.upper(): v for k, v in HERE.items()}), "either"),
     _scan("3D Slicer's .fcsv", fcsv(HERE), "either", file="marks.fcsv"),
     _scan("3D Slicer's .mrk.json", markups(HERE), "either", file="marks.mrk.json"),
-    _scan("3D Slicer's .mrk.json in RAS", markups({k: (-x, -y, z) for k, (x, y, z) in HERE.items()}, "RAS"), "either", file="marks.mrk.json"),
+    _scan(
+        "3D Slicer's .mrk.json in RAS",
+        markups({k: (-x, -y, z) for k, (x, y, z) in HERE.items()}, "RAS"),
+        "either",
+        file="marks.mrk.json",
+    ),
     _scan("a .mrk.json that is none", b"{}", "refused", file="marks.mrk.json"),
     _scan("a cut .mrk.json", markups(HERE), "refused", damage.cut(0.5), file="marks.mrk.json"),
     _scan("a name twice", _LINES + _LINES.splitlines()[1] + b"\n", "refused"),
@@ -143,7 +168,9 @@ _DOUBTFUL = [
 ]
 
 
-def _row(name: str, content: bytes | None, says: str = "egg2|marks2|row 4", ending: Ending = "either") -> Case:
+def _row(
+    name: str, content: bytes | None, says: str = "egg2|marks2|row 4", ending: Ending = "either"
+) -> Case:
     """A table whose row 4 has other landmarks: told of, rejected or refused, and the rest stays as it is."""
 
     def make(goods: Goods, _rng: Generator) -> Files:
@@ -167,7 +194,7 @@ _ROWS = [
     _row("nan", text({**_OWN, "top": (np.nan, 0.0, 0.0)})),
     _row("a name twice", text(_OWN) + b"top,0,0,0\n"),
     _row("two at the origin", text({**_OWN, "top": (0.0, 0.0, 0.0), "left": (0.0, 0.0, 0.0)})),
-    _row("another subject's", tables.marks(7)),
+    _row("another subject's", tables.marks(7), ""),
     _row("two landmarks", text({k: _OWN[k] for k in ("top", "left")})),
     _row("semicolons", text(_OWN, ";"), "8 shapes", "success"),
     _row("UTF-16", text(_OWN).decode().encode("utf-16"), "8 shapes", "success"),

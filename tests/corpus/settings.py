@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from numpy.random import Generator
-
 from corpus import damage
 from corpus.case import OUT, Case, Damage, Ending, Expected, Files, Goods
 from corpus.goods import SETTINGS
 from corpus.stores import trained
+from numpy.random import Generator
 
 WORDS = ("train", "store", "--out", f"{OUT}/mine.safetensors", "--config", "my.toml", "--epochs", "1")
 
@@ -68,17 +67,30 @@ CASES = (
     _case("no layers", _network("template = {width = 8, hidden = -1, omega0 = 5.0}")),
     _case("an omega of nan", _network("template = {width = 8, hidden = 1, omega0 = nan}")),
     _case("an omega of 0", _network("template = {width = 8, hidden = 1, omega0 = 0.0}")),
-    *(_case(f"a width of {width}", _network(f"template = {{width = {width}, hidden = 1, omega0 = 5.0}}")) for width in _WIDTHS),
+    *(
+        _case(f"a width of {width}", _network(f"template = {{width = {width}, hidden = 1, omega0 = 5.0}}"))
+        for width in _WIDTHS
+    ),
     *(_case(f"a code of {size}", _network(f"latent = {size}")) for size in ("-2", "0", "10000000000", "2.5")),
     *(_case(f"{dims} dimensions", _network(f"dim = {dims}")) for dims in ("0", "2", "7")),
     *(_case(f"a rate of {rate}", _training(f"template_rate = {rate}")) for rate in _RATES),
     *(_case(f"{count} points", _training(f"surface_points = {count}")) for count in _POINTS),
     *(_case(f"{count} shapes", _training(f"batch_shapes = {count}")) for count in ("0", "-4", '"all"')),
-    *(_case(f"a share of {share}", _training(f"population_share = {share}")) for share in ("nan", "-0.5", "2.0")),
-    *(_case(f"templates at {value}", _training(f"template_epochs = {value}")) for value in ("5", "[-1]", '["a"]')),
+    *(
+        _case(f"a share of {share}", _training(f"population_share = {share}"))
+        for share in ("nan", "-0.5", "2.0")
+    ),
+    *(
+        _case(f"templates at {value}", _training(f"template_epochs = {value}"))
+        for value in ("5", "[-1]", '["a"]')
+    ),
     _case("weights of nan", _training("loss = {surface_distance = nan}")),
     _case("a negative weight", _training("loss = {surface_distance = -1.0}")),
-    *(_case(what, content) for what, content in damage.STRANGERS.items() if what not in ("nothing", "one byte")),
+    *(
+        _case(what, content)
+        for what, content in damage.STRANGERS.items()
+        if what not in ("nothing", "one byte")
+    ),
     *(_case(f"flips {turn}", SETTINGS, "either", damage.flip(3)) for turn in "abcd"),
     _case("swapped blocks", SETTINGS, "either", damage.swap(12)),
 )

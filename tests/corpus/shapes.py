@@ -10,7 +10,7 @@ from functools import cache
 
 import numpy as np
 from eggs import egg
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Points = NDArray[np.float64]
 Polygons = Sequence[Sequence[int]]
@@ -23,7 +23,7 @@ class Shape:
     points: Points
     polygons: Polygons
 
-    def moved(self, matrix: object, shift: object = (0.0, 0.0, 0.0)) -> Shape:
+    def moved(self, matrix: ArrayLike, shift: ArrayLike = (0.0, 0.0, 0.0)) -> Shape:
         """Points times a 3x3 matrix, or a number, and shifted."""
         factor = np.asarray(matrix, float) * np.eye(3) if np.ndim(matrix) == 0 else np.asarray(matrix, float)
         return Shape(self.points @ factor.T + np.asarray(shift, float), self.polygons)
@@ -94,9 +94,15 @@ def strips(rings: int = 24, sides: int = 32) -> tuple[Shape, list[list[int]]]:
 def stl(shape: Shape, header: bytes = b"made by hand", count: int | None = None, order: str = "<") -> bytes:
     """Binary; ``count`` is what is announced where that is not the truth."""
     corners = shape.points[shape.triangles].astype(f"{order}f4")
-    record = np.zeros(len(corners), [("normal", f"{order}f4", 3), ("corners", f"{order}f4", (3, 3)), ("a", "u2")])
+    record = np.zeros(
+        len(corners), [("normal", f"{order}f4", 3), ("corners", f"{order}f4", (3, 3)), ("a", "u2")]
+    )
     record["corners"] = corners
-    return header.ljust(80, b"\0") + struct.pack(f"{order}I", len(corners) if count is None else count) + record.tobytes()
+    return (
+        header.ljust(80, b"\0")
+        + struct.pack(f"{order}I", len(corners) if count is None else count)
+        + record.tobytes()
+    )
 
 
 def stl_text(shape: Shape, number: str = "{:.6e}", name: str = "egg") -> bytes:
@@ -141,7 +147,12 @@ def _ply_header(
 ) -> bytes:
     lines = ["ply", f"format {name} 1.0", *before, f"element vertex {len(shape.points)}"]
     lines += [f"property {real} {axis}" for axis in "xyz"]
-    lines += [f"element face {len(shape.polygons)}", f"property list uchar {index} {listed}", "end_header", ""]
+    lines += [
+        f"element face {len(shape.polygons)}",
+        f"property list uchar {index} {listed}",
+        "end_header",
+        "",
+    ]
     return "\n".join(lines).encode()
 
 
@@ -208,7 +219,13 @@ def vtk(shape: Shape) -> bytes:
 def vtk_strips() -> bytes:
     """Legacy, ASCII, as strips of triangles."""
     shape, runs = strips()
-    lines = ["# vtk DataFile Version 3.0", "egg", "ASCII", "DATASET POLYDATA", f"POINTS {len(shape.points)} float"]
+    lines = [
+        "# vtk DataFile Version 3.0",
+        "egg",
+        "ASCII",
+        "DATASET POLYDATA",
+        f"POINTS {len(shape.points)} float",
+    ]
     lines += [" ".join(f"{x:.6f}" for x in point) for point in shape.points]
     lines += [f"TRIANGLE_STRIPS {len(runs)} {sum(len(run) + 1 for run in runs)}"]
     return "\n".join([*lines, *(" ".join(map(str, [len(run), *run])) for run in runs), ""]).encode()
@@ -256,12 +273,16 @@ def glb(shape: Shape, mode: int = 4, change: dict[str, object] | None = None, fa
         ],
         "accessors": [
             {
-                "bufferView": 0, "componentType": 5126, "count": len(points), "type": "VEC3",
-                "min": points.min(axis=0).tolist(), "max": points.max(axis=0).tolist(),
+                "bufferView": 0,
+                "componentType": 5126,
+                "count": len(points),
+                "type": "VEC3",
+                "min": points.min(axis=0).tolist(),
+                "max": points.max(axis=0).tolist(),
             },
             {"bufferView": 1, "componentType": 5125, "count": indices.size, "type": "SCALAR"},
         ],
-    }  # fmt: skip
+    }
     return glb_of(record | (change or {}), body)
 
 
@@ -269,5 +290,7 @@ def glb_of(record: dict[str, object], body: bytes) -> bytes:
     """The two chunks of a file: what is in it, and the numbers."""
     text = json.dumps(record).encode()
     text, body = text.ljust(-(-len(text) // 4) * 4), body.ljust(-(-len(body) // 4) * 4, b"\0")
-    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(body), 0x004E4942) + body
+    chunks = (
+        struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(body), 0x004E4942) + body
+    )
     return struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks

@@ -4,19 +4,32 @@ from __future__ import annotations
 
 import gzip
 from functools import partial
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-
-from corpus import damage, images
-from corpus.case import REFUSED, Case, Damage, Special
+from corpus import damage
+from corpus.case import REFUSED, Case, Damage, Expected, Special
 from corpus.fits import case, special, whole
-from corpus.images import SPACING_MM, VOLUME, labels, nifti, nifti_gz, nrrd, placed, segment, slicer, turned, two_labels
+from corpus.images import (
+    SPACING_MM,
+    VOLUME,
+    labels,
+    nifti,
+    nifti_gz,
+    nrrd,
+    placed,
+    segment,
+    slicer,
+    turned,
+    two_labels,
+)
+from numpy.typing import NDArray
 
 KIND = "volume"
 _volume = partial(case, KIND)
 GOOD = whole(VOLUME)
 EITHER = whole(VOLUME, "either")
+BOX = whole(float(labels().size * np.prod(SPACING_MM)) / 1000, "either")
 FORMS = {"nii": nifti, "nii.gz": nifti_gz, "nrrd": nrrd, "packed.nrrd": partial(nrrd, encoding="gzip")}
 _KINDS = ("u1", "i1", "u2", "i2", "u4", "i4", "u8", "i8", "f4", "f8")
 
@@ -25,14 +38,16 @@ def _file(form: str) -> str:
     return f"egg.{form}"
 
 
-def _nii(name: str, expected: object = GOOD, *damages: Damage, words: tuple[str, ...] = (), **header: object) -> Case:
-    assert expected in (GOOD, EITHER, REFUSED)
-    return _volume(f"nii: {name}", "egg.nii", partial(nifti, **header), expected, *damages, words=words)  # type: ignore[arg-type]
+def _nii(
+    name: str, expected: Expected = GOOD, *damages: Damage, words: tuple[str, ...] = (), **header: Any
+) -> Case:
+    return _volume(f"nii: {name}", "egg.nii", partial(nifti, **header), expected, *damages, words=words)
 
 
-def _nrrd(name: str, expected: object = GOOD, *damages: Damage, words: tuple[str, ...] = (), **header: object) -> Case:
-    assert expected in (GOOD, EITHER, REFUSED)
-    return _volume(f"nrrd: {name}", "egg.nrrd", partial(nrrd, **header), expected, *damages, words=words)  # type: ignore[arg-type]
+def _nrrd(
+    name: str, expected: Expected = GOOD, *damages: Damage, words: tuple[str, ...] = (), **header: Any
+) -> Case:
+    return _volume(f"nrrd: {name}", "egg.nrrd", partial(nrrd, **header), expected, *damages, words=words)
 
 
 def _noisy(kind: str, value: float, size: float) -> NDArray:
@@ -59,6 +74,11 @@ def _minus() -> NDArray:
     return voxels
 
 
+def _told(name: str, value: object) -> dict[str, Any]:
+    """One more line of a header."""
+    return {name: value}
+
+
 _AXES_MM = np.diag([-1.0, 1.0, 1.0])
 _SHEAR = np.array([[1.0, np.sin(np.radians(10)), 0], [0, 1, 0], [0, 0, 1]])
 _SMALL_SHEAR = np.array([[1.0, np.sin(np.radians(0.05)), 0], [0, 1, 0], [0, 0, 1]])
@@ -82,23 +102,40 @@ _WRITTEN = [
     *(_volume(f"{form} in capitals", _file(form.upper()), good, GOOD) for form, good in FORMS.items()),
     *(
         _volume(f"{true} named {name}", name, FORMS[true], EITHER)
-        for true, name in (("nii", "egg"), ("nii", "egg.img"), ("nrrd", "egg.stl"), ("nrrd", "egg.nhdr"), ("nii.gz", "egg.gz"))
+        for true, name in (
+            ("nii", "egg"),
+            ("nii", "egg.img"),
+            ("nrrd", "egg.stl"),
+            ("nrrd", "egg.nhdr"),
+            ("nii.gz", "egg.gz"),
+        )
     ),
     *(
         _volume(f"{form} and {len(more)} bytes more", _file(form), good, GOOD, damage.ended_with(more))
         for form, good in FORMS.items()
         for more in (bytes(16), b"made by a tool\n")
     ),
-    _volume("nii.gz in two parts", "egg.nii.gz", lambda: gzip.compress(nifti()[:20000], mtime=0) + gzip.compress(nifti()[20000:], mtime=0), GOOD),
+    _volume(
+        "nii.gz in two parts",
+        "egg.nii.gz",
+        lambda: gzip.compress(nifti()[:20000], mtime=0) + gzip.compress(nifti()[20000:], mtime=0),
+        GOOD,
+    ),
     _volume("nii.gz packed twice", "egg.nii.gz", nifti_gz, EITHER, damage.gzipped),
     _volume("nrrd.gz", "egg.nrrd.gz", nrrd, EITHER, damage.gzipped),
 ]
 _VALUES = [
-    *(_nii(f"slope {slope:g}, inter {inter:g}", voxels=labels(2), slope=slope, inter=inter) for slope, inter in ((1.0, 0.0), (0.5, 0.0), (2.0, 0.0), (0.0, 5.0))),
+    *(
+        _nii(f"slope {slope:g}, inter {inter:g}", voxels=labels(2), slope=slope, inter=inter)
+        for slope, inter in ((1.0, 0.0), (0.5, 0.0), (2.0, 0.0), (0.0, 5.0))
+    ),
     _nii("inter 1", voxels=labels(1, "i2"), slope=1.0, inter=1.0, words=("--label", "2")),
     _nii("inter -1", voxels=labels(3, "i2", background=1), slope=1.0, inter=-1.0),
     _nii("slope nan", EITHER, voxels=labels(1), slope=np.nan),
-    *(_nii(f"about {value:g} ± {size:g}", voxels=_noisy(kind, value, size)) for kind, value, size in (("f4", 2, 1e-4), ("f4", 7, 1e-6), ("f8", 6.9999, 0.0))),
+    *(
+        _nii(f"about {value:g} ± {size:g}", voxels=_noisy(kind, value, size))
+        for kind, value, size in (("f4", 2, 1e-4), ("f4", 7, 1e-6), ("f8", 6.9999, 0.0))
+    ),
     _nii("3e9 as a float", voxels=labels(3e9, "f8")),
     _nii("a map of probabilities", REFUSED, voxels=_noisy("f4", 0.7, 0.3)),
     _nii("a scan", REFUSED, voxels=_scan()),
@@ -106,7 +143,7 @@ _VALUES = [
     _nii("infinite inside", REFUSED, voxels=labels(np.inf, "f4")),
     _nii("not a number outside", EITHER, voxels=labels(1, "f4", background=np.nan)),
     _nii("nothing labelled", REFUSED, voxels=0 * labels()),
-    _nii("all labelled", EITHER, voxels=0 * labels() + 1),
+    _nii("all labelled", BOX, voxels=0 * labels() + 1),
     _nii("1500 labels and one named", voxels=_many(1500), words=("--label", "4512")),
     _nii("1500 labels", REFUSED, voxels=_many(1500)),
     _nii("300 labels", REFUSED, voxels=_many(300)),
@@ -121,7 +158,9 @@ _VALUES = [
     _nii("32767 and 1", words=("--label", "32767"), voxels=np.where(labels() > 0, 32767, 0).astype("i2")),
 ]
 _NAMED = [
-    _volume(f"slicer: {name}", "egg.seg.nrrd", partial(slicer, two_labels(), *segments), expected, words=words)
+    _volume(
+        f"slicer: {name}", "egg.seg.nrrd", partial(slicer, two_labels(), *segments), expected, words=words
+    )
     for name, segments, words, expected in (
         ("a number", (segment(0, 1, "block"), segment(1, 2, "egg")), ("--label", "2"), GOOD),
         ("a name", (segment(0, 1, "block"), segment(1, 2, "egg")), ("--label", "egg"), GOOD),
@@ -130,7 +169,12 @@ _NAMED = [
         ("neither of them", (segment(0, 1, "EGG"), segment(1, 2, "eGG")), ("--label", "egg"), REFUSED),
         ("one name twice", (segment(0, 1, "egg"), segment(1, 2, "egg")), ("--label", "egg"), REFUSED),
         ("a name that is a number", (segment(0, 1, "2"), segment(1, 2, "1")), ("--label", "2"), GOOD),
-        ("a name with spaces", (segment(0, 1, "block"), segment(1, 2, "the egg")), ("--label", "the egg"), GOOD),
+        (
+            "a name with spaces",
+            (segment(0, 1, "block"), segment(1, 2, "the egg")),
+            ("--label", "the egg"),
+            GOOD,
+        ),
         ("no name", (segment(0, 1, "block"), segment(1, 2, "egg")), (), REFUSED),
         ("another name", (segment(0, 1, "block"), segment(1, 2, "egg")), ("--label", "lung"), REFUSED),
     )
@@ -148,9 +192,21 @@ def _layered(*names: str) -> bytes:
 
 
 _LAYERED = [
-    _volume("slicer: layers and a name", "egg.seg.nrrd", partial(_layered, "block", "egg"), GOOD, words=("--label", "egg")),
+    _volume(
+        "slicer: layers and a name",
+        "egg.seg.nrrd",
+        partial(_layered, "block", "egg"),
+        GOOD,
+        words=("--label", "egg"),
+    ),
     _volume("slicer: layers", "egg.seg.nrrd", partial(_layered, "block", "egg"), REFUSED),
-    _volume("slicer: layers and another name", "egg.seg.nrrd", partial(_layered, "block", "egg"), REFUSED, words=("--label", "lung")),
+    _volume(
+        "slicer: layers and another name",
+        "egg.seg.nrrd",
+        partial(_layered, "block", "egg"),
+        REFUSED,
+        words=("--label", "lung"),
+    ),
     _volume("slicer: layers without names", "egg.seg.nrrd", _layered, REFUSED),
 ]
 _PLACES = [
@@ -189,9 +245,16 @@ _PLACES = [
     _nrrd("a dimension of the space", drop=("space",), space_dimension=3),
     _nrrd("spacings", drop=("space", "space directions", "space origin"), spacings="1.5 1.5 2.5"),
     _nrrd("no spacing", REFUSED, drop=("space", "space directions", "space origin")),
-    _nrrd("spacings nan", REFUSED, drop=("space", "space directions", "space origin"), spacings="nan nan nan"),
+    _nrrd(
+        "spacings nan", REFUSED, drop=("space", "space directions", "space origin"), spacings="nan nan nan"
+    ),
     _nrrd("spacings 0", REFUSED, drop=("space", "space directions", "space origin"), spacings="0 0 0"),
-    _nrrd("spacings with commas", EITHER, drop=("space", "space directions", "space origin"), spacings="1,5 1,5 2,5"),
+    _nrrd(
+        "spacings with commas",
+        EITHER,
+        drop=("space", "space directions", "space origin"),
+        spacings="1,5 1,5 2,5",
+    ),
     _nrrd("nan in the directions", REFUSED, space_directions="(nan,0,0) (0,1.5,0) (0,0,2.5)"),
     _nrrd("words in the directions", REFUSED, space_directions="(a,0,0) (0,1.5,0) (0,0,2.5)"),
     _nrrd("directions of zeros", REFUSED, space_directions="(0,0,0) (0,1.5,0) (0,0,2.5)"),
@@ -225,14 +288,32 @@ _SIZES = [
     _nii("three values a voxel", REFUSED, voxels=np.stack([labels()] * 3, axis=-1)[:, :, :, None, :]),
     *(
         _nii(f"dimensions {dims}", REFUSED, dims=dims)
-        for dims in ((3, 30000, 30000, 30000), (3, 0, 35, 33), (3, -37, 35, 33), (3, 38, 35, 33), (9, 37, 35, 33), (0, 37, 35, 33))
+        for dims in (
+            (3, 30000, 30000, 30000),
+            (3, 0, 35, 33),
+            (3, -37, 35, 33),
+            (3, 38, 35, 33),
+            (9, 37, 35, 33),
+            (0, 37, 35, 33),
+        )
     ),
     _nrrd("no colour", REFUSED, voxels=labels()[:, :, 16], kinds="domain domain"),
     *(
-        _nrrd(f"{name} {value}", REFUSED, **{name: value})
+        _nrrd(f"{name} {value}", REFUSED, **_told(name, value))
         for name, value in (
-            *(("sizes", "30000 30000 30000"), ("sizes", "0 35 33"), ("sizes", "-37 35 33"), ("sizes", "38 35 33")),
-            *(("sizes", "37 35"), ("sizes", "a b c"), ("dimension", 4), ("dimension", "x"), ("dimension", 99)),
+            *(
+                ("sizes", "30000 30000 30000"),
+                ("sizes", "0 35 33"),
+                ("sizes", "-37 35 33"),
+                ("sizes", "38 35 33"),
+            ),
+            *(
+                ("sizes", "37 35"),
+                ("sizes", "a b c"),
+                ("dimension", 4),
+                ("dimension", "x"),
+                ("dimension", 99),
+            ),
             *(("type", "block"), ("type", "quaternion"), ("encoding", "zip"), ("data_file", "gone.raw")),
             *(("data_file", "/etc/passwd"), ("byte_skip", 999999), ("line_skip", 999999)),
         )
@@ -250,27 +331,49 @@ _BROKEN = [
         for form, good in FORMS.items()
         for share in (0.004, 0.2, 0.55, 0.98)
     ),
-    *(_volume(f"{form} without its last byte", _file(form), good, REFUSED, damage.short(1)) for form, good in FORMS.items() if form != "packed.nrrd"),
+    *(
+        _volume(f"{form} without its last byte", _file(form), good, REFUSED, damage.short(1))
+        for form, good in FORMS.items()
+        if form != "packed.nrrd"
+    ),
     *(
         _volume(f"{form} with {count} flips {turn}", _file(form), good, EITHER, damage.flip(count))
         for form, good in FORMS.items()
         for count, turn in ((1, "a"), (10, "a"), (300, "a"))
     ),
     *(
-        _volume(f"{form} with flips in the header {turn}", _file(form), FORMS[form], EITHER, damage.flip(2, 0, 340))
+        _volume(
+            f"{form} with flips in the header {turn}",
+            _file(form),
+            FORMS[form],
+            EITHER,
+            damage.flip(2, 0, 340),
+        )
         for form in ("nii", "nrrd")
         for turn in "abcdef"
     ),
-    *(_volume(f"{form} with a hole", _file(form), good, REFUSED, damage.hole(999)) for form, good in FORMS.items()),
-    *(_volume(f"{form} with zeros", _file(form), FORMS[form], REFUSED, damage.zeros(500)) for form in ("nii.gz", "packed.nrrd")),
-    *(_volume(f"{form} with random bytes", _file(form), good, REFUSED, damage.noise(0, 400)) for form, good in FORMS.items()),
+    *(
+        _volume(f"{form} with a hole", _file(form), good, REFUSED, damage.hole(999))
+        for form, good in FORMS.items()
+    ),
+    *(
+        _volume(f"{form} with zeros", _file(form), FORMS[form], REFUSED, damage.zeros(500))
+        for form in ("nii.gz", "packed.nrrd")
+    ),
+    *(
+        _volume(f"{form} with random bytes", _file(form), good, REFUSED, damage.noise(0, 400))
+        for form, good in FORMS.items()
+    ),
     *(
         _volume(f"{what} named .{form}", _file(form), lambda content=content: content, REFUSED)
         for form in FORMS
         for what, content in damage.STRANGERS.items()
         if form == "nii.gz" or what in ("nothing", "a web page", "zeros")
     ),
-    *(special(KIND, what, f"egg.{form}", REFUSED) for what, form in zip(Special, ("nii", "nrrd", "nii.gz"), strict=True)),
+    *(
+        special(KIND, what, f"egg.{form}", REFUSED)
+        for what, form in zip(Special, ("nii", "nrrd", "nii.gz"), strict=True)
+    ),
     _nii("no magic", EITHER, magic=b"\0\0\0\0"),
     _nii("the header of a pair", REFUSED, magic=b"ni1\0"),
     _volume("a header alone", "egg.nii", lambda: nifti()[:348], REFUSED),
