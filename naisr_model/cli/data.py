@@ -61,12 +61,14 @@ def prepare(
         seed: of the split and of the samples.
         workers: processes; left out, one a core.
     """
-    from naisr_model.data.prepare import PrepareOptions
+    from naisr_model.data.prepare import PrepareOptions, require_possible
     from naisr_model.data.prepare import prepare as run
     from naisr_model.data.tables import missing_files, read_table
 
     if out is None and not check:
         raise InputError("give the folder of the store, --out FOLDER, or --check to look at the table alone")
+    options = PrepareOptions(surface_samples, near_samples, uniform_samples, held_out, seed, workers)
+    require_possible(options)
     read = read_table(table)
     for line in (*read.summary, *(f"{one.severity}: {one.text}" for one in gravest_first(read.remarks))):
         print(line, flush=True)
@@ -74,7 +76,6 @@ def prepare(
         for sentence in missing_files(read):
             print(f"missing {sentence}")
         return
-    options = PrepareOptions(surface_samples, near_samples, uniform_samples, held_out, seed, workers)
     with bar("preparing") as progress:
         report = run(table, out, options=options, progress=progress)
     for line in report.lines:

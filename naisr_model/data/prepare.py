@@ -133,7 +133,12 @@ def _prepare(table: ShapeTable, out: Path, options: PrepareOptions, progress: Pr
     return report
 
 
-def _checked_table(csv: str | Path, options: PrepareOptions) -> ShapeTable:
+def require_possible(options: PrepareOptions) -> None:
+    """Refuse what nothing can be prepared with, before anything is read.
+
+    Raises:
+        InputError: with what arrived and what is possible.
+    """
     if not 0 <= options.held_out < 1:
         raise InputError(f"the held-out share is {options.held_out:g}; give a number from 0 to below 1")
     for kind in store.KINDS:
@@ -143,6 +148,10 @@ def _checked_table(csv: str | Path, options: PrepareOptions) -> ShapeTable:
             )
     if not 0 <= options.seed < 2**32:
         raise InputError(f"the seed is {options.seed}; give 0 or more, up to {2**32 - 1}")
+
+
+def _checked_table(csv: str | Path, options: PrepareOptions) -> ShapeTable:
+    require_possible(options)
     table = tables.read_table(csv)
     if any(row.mesh == Path(csv).parent for row in table.rows):
         raise InputError(f"{Path(csv).name} has no column 'mesh'; add one with the path of each mesh")

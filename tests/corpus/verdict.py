@@ -78,8 +78,8 @@ def _wrong(outcome: Outcome) -> str:
 
 def _last_words(err: str) -> str:
     """Where a process was when it died, if it could say so."""
-    start = err.find("Fatal Python error")
-    return err[start : start + 2500] if start >= 0 else err[-1500:]
+    fatal, thread = err.find("Fatal Python error"), err.find("Current thread")
+    return err[fatal : fatal + 60] + err[thread : thread + 2000] if fatal >= 0 else err[-1500:]
 
 
 def _of_refusal(outcome: Outcome, report: Report) -> Iterator[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 import time
 from collections.abc import Iterator
@@ -26,9 +27,17 @@ def opened(job: Job) -> int:
         RuntimeError: when neither is.
     """
     from naisr_viewer.program.display import ensure_display
-    from naisr_viewer.program.start import make_engine, own_window
 
     ensure_display((1280, 800))
+    message, is_shown = _seen(job)
+    _bury()
+    return _told(message, is_shown)
+
+
+def _seen(job: Job) -> tuple[str, bool]:
+    """The message in the window, and whether the file is shown."""
+    from naisr_viewer.program.start import make_engine, own_window
+
     path = job.folder / job.words[0]
     with own_window(make_engine("cpu")) as (window, controller), _dialogs_declined() as asked:
         window.resize(1280, 800)
@@ -42,10 +51,19 @@ def opened(job: Job) -> int:
         else:
             window.scan_requested.emit(path)
         _rest(window, controller)
-        message = window.error_text.text() or "; ".join(asked)
         atlas = controller.state.atlas
         is_shown = bool(controller.state.patients) or (atlas is not None and atlas.path == path)
-        return _told(message, is_shown)
+        window.deleteLater()
+        return window.error_text.text() or "; ".join(asked), is_shown
+
+
+def _bury() -> None:
+    """Delete the window here and now: a later look for garbage may come in a thread that Qt is not in."""
+    from PySide6.QtCore import QCoreApplication, QEvent
+
+    gc.collect()
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete.value)
+    gc.collect()
 
 
 def _told(message: str, is_shown: bool) -> int:

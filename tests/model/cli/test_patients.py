@@ -177,7 +177,7 @@ def test_the_report_of_a_fit_reads_as_people_write(egg_atlas, patient, monkeypat
     monkeypatch.setattr(Fit, "intervals", {"age": (3.0, 5.5), "sex": (-1.0, 1.0)})
     assert cli.main(["fit", str(patient), "--atlas", str(egg_atlas)]) == 0
     said = capsys.readouterr().out
-    assert "(3 years to 5.5 years)" in said and "(F or M)" in said
+    assert "(3 to 5.5 years)" in said and "(F or M)" in said
     assert "or, with a probability of 42 %: 3.988 years, F\n" in said
 
 

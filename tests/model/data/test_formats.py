@@ -72,9 +72,15 @@ FOREIGN = {
     "report.stl": (b"%PDF-1.7\n%\xe2\xe3", "is a PDF document"),
     "picture.ply": (b"\x89PNG\r\n\x1a\n" + bytes(200), r"is a picture \(PNG\)"),
     "photo.obj": (b"\xff\xd8\xff\xe0" + bytes(200), r"is a picture \(JPEG\)"),
-    "scan.stl": (bytes(128) + b"DICM" + bytes(100), "is a DICOM image; segment"),
-    "volume.stl": (b"NRRD0004\ntype: short\n" + bytes(100), "is an NRRD volume; name it .nrrd"),
-    "brain.stl": (bytes(344) + b"n+1\0" + bytes(100), "is a NIfTI volume; name it .nii"),
+    "scan.stl": (bytes(128) + b"DICM" + bytes(100), "is a DICOM"),
+    "volume.stl": (
+        b"NRRD0004\ntype: short\n" + bytes(100),
+        "is an NRRD volume; name it .nrrd|how many voxels",
+    ),
+    "brain.stl": (
+        bytes(344) + b"n+1\0" + bytes(100),
+        "is a NIfTI volume; name it .nii|announces 0 dimensions",
+    ),
     "scene.glb": (b'{"asset": {"version": "2.0"}}', "is glTF as text; save it as GLB"),
     "model.stl": (b'<?xml version="1.0"?>\n<COLLADA version="1.4"/>', "is a COLLADA file; save it as"),
     "strange.vtp": (b'<?xml version="1.0"?>\n<recipe/>', r"is an XML file \('recipe'\)"),

@@ -122,7 +122,7 @@ def test_what_no_training_made_is_left_alone(egg_store, egg_table, egg_atlas, tm
             train(egg_store, egg_preset(epochs=1), out)
         assert out.read_bytes() == before
     assert sorted(os.listdir(tmp_path)) == ["given.safetensors", "table.csv"]
-    with pytest.raises(InputError, match="is a folder; give the name of a file"):
+    with pytest.raises(InputError, match=r"is a folder; give the name of the \.safetensors file"):
         train(egg_store, egg_preset(epochs=1), tmp_path)
 
 
@@ -294,7 +294,8 @@ def test_a_state_of_other_contents_is_refused(stopped, egg_store, tmp_path, chan
     state = torch.load(stopped.with_name(stopped.name + ".training") / "state.pt", weights_only=True)
     torch.save(change(state), place)
     with pytest.raises(
-        InputError, match=r"state .*state\.pt cannot be read \(.*; delete .*\.training to start"
+        InputError,
+        match=r"state .*state\.pt cannot be read \(.*; delete its folder and a\.safetensors to start",
     ):
         train(egg_store, egg_preset(epochs=2), out)
     assert not out.exists()
