@@ -544,8 +544,10 @@ def test_several_scans_that_are_dropped_are_all_read(ready, qtbot, tmp_path):
 
 def test_of_several_files_every_one_that_cannot_be_read_is_told_of(ready, qtbot, tmp_path):
     window, controller = ready
+    egg(5.0, 1.0).export(tmp_path / "good.ply")
+    for name in ("first.docx", "last.docx"):
+        (tmp_path / name).write_text("a letter")
     for name in ("first.docx", "good.ply", "last.docx"):
-        egg(5.0, 1.0).export(tmp_path / name, file_type="ply")
         drop(window, tmp_path / name)
     qtbot.waitUntil(lambda: len(controller.state.patients) == 1, timeout=60_000)
     settle(qtbot, controller)
