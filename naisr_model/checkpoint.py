@@ -24,6 +24,7 @@ from torch import Tensor
 from naisr_model import records
 from naisr_model.config import Preset, to_json
 from naisr_model.covariates import Population
+from naisr_model.data import formats
 from naisr_model.data.align import Alignment
 from naisr_model.errors import InputError
 from naisr_model.files import replacing, require_file
@@ -163,19 +164,6 @@ def load(path: str | Path) -> Checkpoint:
     return checkpoint
 
 
-_MESHES = {
-    b"solid": "an STL mesh",
-    b"ply": "a PLY mesh",
-    b"glTF": "a GLB mesh",
-    b"# vtk": "a VTK mesh",
-    b"<?xml": "a VTP mesh",
-    b"<VTKFile": "a VTP mesh",
-    b"v ": "an OBJ mesh",
-    b"NRRD": "an NRRD volume",
-    b"\x1f\x8b": "a compressed volume",
-}
-"""What files of patients begin with."""
-
 _OTHERS = {
     b"PK": "a zip archive or a PyTorch file",
     b"\x80\x02": "a pickle",
@@ -183,12 +171,8 @@ _OTHERS = {
     b"\x80\x04": "a pickle",
     b"\x80\x05": "a pickle",
     b"{": "a JSON file",
-    b"mesh,": "a table",
 }
-"""What other files begin with that are at hand where an atlas is."""
-
-BEGINNING = 512
-"""Bytes of a file that tell what it is."""
+"""What files begin with that are at hand where an atlas is."""
 
 FARTHEST = 1e6
 """Model units; the box is 2 wide, so no distance is larger."""
@@ -196,24 +180,18 @@ FARTHEST = 1e6
 
 def _foreign(path: Path) -> str:
     """What a file is that is no .safetensors file, by its contents, and what to do."""
-    with path.open("rb") as file:
-        begin = file.read(BEGINNING)
-    if not begin:
-        return "is empty, not a complete .safetensors file; copy it again, or train it again"
-    scan = next((title for magic, title in _MESHES.items() if begin.startswith(magic)), "")
-    if path.stat().st_size == 84 + 50 * int.from_bytes(begin[80:84], "little"):
-        scan = "an STL mesh"
-    if begin[344:347] in (b"n+1", b"ni1"):
-        scan = "a NIfTI volume"
-    if b"\nv " in begin:
-        scan = "an OBJ mesh"
-    if scan:
+    content = formats.content_of(path)
+    mesh = formats.format_of(formats.plain(content), path.suffix.lower().removeprefix("."))
+    others = [title for magic, title in _OTHERS.items() if content.startswith(magic)]
+    what, _ = formats.foreign(content) or ("", "")
+    if mesh or "volume" in what:
+        what = f"a mesh ({formats.MESHES[mesh]})" if mesh else what
         return (
-            f"is {scan}, not an atlas; open it as a scan: 'Open scan…' in the window, --scan {path.name} or "
+            f"is {what}, not an atlas; open it as a scan: 'Open scan…' in the window, --scan {path.name} or "
             "'naisr fit' on the command line"
         )
-    if other := [title for magic, title in _OTHERS.items() if begin.startswith(magic)]:
-        return f"is {other[0]}, not an atlas; give a .safetensors file that 'naisr train' wrote"
+    if others or what:
+        return f"is {[*others, what][0]}, not an atlas; give a .safetensors file that 'naisr train' wrote"
     return "is not a complete .safetensors file; copy it again, or train it again"
 
 

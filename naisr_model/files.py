@@ -10,6 +10,7 @@ import hashlib
 import os
 import secrets
 import shutil
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -124,23 +125,58 @@ def flush(descriptor: int) -> None:
             raise
 
 
-def require_file(path: Path, kind: str) -> None:
-    """Make sure that a file can be there to be read.
+_SPECIAL = {
+    stat.S_ISDIR: ("is a folder", "give a file in it"),
+    stat.S_ISFIFO: ("is a pipe", "write its content into a file first"),
+    stat.S_ISSOCK: ("is a socket", "give a file"),
+    stat.S_ISCHR: ("is a device", "give a file"),
+    stat.S_ISBLK: ("is a device", "give a file"),
+}
+
+
+def require_file(path: str | Path, kind: str = "") -> Path:
+    """The path of a file that is there and has content.
 
     Args:
         path: of the file.
         kind: what it should be, as ``an atlas (.safetensors)``.
 
     Raises:
-        InputError: when there is nothing, or a folder or a device.
+        InputError: when nothing is there, or a folder, a pipe, a link to nowhere or to itself, an empty file,
+            or what may not be looked at.
     """
-    if path.is_file():
-        return
-    if path.is_dir():
-        raise InputError(f"{path} is a folder; give the path of {kind}")
-    if path.exists():
-        raise InputError(f"{path} is no regular file; give the path of {kind}")
-    raise InputError(f"there is no file {path}; give the path of {kind}")
+    path = Path(path)
+    try:
+        state = path.stat()
+    except (OSError, ValueError) as error:
+        raise InputError(why_unreadable(path, error, kind)) from error
+    for applies, (what, remedy) in _SPECIAL.items():
+        if applies(state.st_mode):
+            raise InputError(f"{path} {what}; {_give(kind) or remedy}")
+    if not state.st_size:
+        raise InputError(f"{path.name} is empty (0 bytes); copy or export it again")
+    return path
+
+
+def why_unreadable(path: Path, error: OSError | ValueError, kind: str = "") -> str:
+    """What keeps a file from being read, and what to do, in a sentence."""
+    if not isinstance(error, OSError):
+        return f"{str(path)!r} is no path ({error}); correct it"
+    if error.errno == errno.ELOOP:
+        return f"{path} is a link that leads back to itself; give the file that is meant"
+    if error.errno == errno.ENOENT and path.is_symlink():
+        return f"{path} is a link to {path.readlink()}, which does not exist; give the file that is meant"
+    if error.errno == errno.ENOENT:
+        return f"{path} does not exist; {_give(kind) or 'correct the path'}"
+    if error.errno == errno.ENOTDIR:
+        return f"{path} does not exist, since a part of it is a file and no folder; correct the path"
+    if error.errno in (errno.EACCES, errno.EPERM):
+        return f"{path} may not be read by you; change its permissions or copy it"
+    return f"{path} cannot be read ({error.strerror or error}); correct the path or copy the file"
+
+
+def _give(kind: str) -> str:
+    return f"give the path of {kind}" if kind else ""
 
 
 Stamp = tuple[int, int] | None

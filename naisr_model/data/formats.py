@@ -7,78 +7,34 @@ and :func:`refuse_foreign` says of what is no shape what it is and what to do wi
 from __future__ import annotations
 
 import codecs
-import errno
 import gzip
 import re
-import stat
 import struct
 import zlib
 from pathlib import Path
 
 from naisr_model.errors import InputError
+from naisr_model.files import require_file, why_unreadable
 
 MOST_BYTES = 2 << 30
 """Of one mesh, unpacked; what is longer would not fit into the memory of most computers."""
-
-_SPECIAL = {
-    stat.S_ISDIR: ("is a folder", "give a file in it"),
-    stat.S_ISFIFO: ("is a pipe", "write its content into a file first"),
-    stat.S_ISSOCK: ("is a socket", "give a file"),
-    stat.S_ISCHR: ("is a device", "give a file"),
-    stat.S_ISBLK: ("is a device", "give a file"),
-}
-
-
-def check_path(path: str | Path) -> Path:
-    """The path of a file that is there and has content.
-
-    Raises:
-        InputError: when nothing is there, or a folder, a pipe, a link to nowhere or to itself, an empty file,
-            or what may not be looked at.
-    """
-    path = Path(path)
-    try:
-        state = path.stat()
-    except (OSError, ValueError) as error:
-        raise InputError(_why_not_there(path, error)) from error
-    for applies, (what, remedy) in _SPECIAL.items():
-        if applies(state.st_mode):
-            raise InputError(f"{path} {what}; {remedy}")
-    if not state.st_size:
-        raise InputError(f"{path.name} is empty (0 bytes); copy or export it again")
-    return path
 
 
 def content_of(path: str | Path) -> bytes:
     """All bytes of a file.
 
     Raises:
-        InputError: as :func:`check_path`, and when it may not be read or is larger than :data:`MOST_BYTES`.
+        InputError: as :func:`~naisr_model.files.require_file`, and when it may not be read or is larger than
+            :data:`MOST_BYTES`.
     """
-    path = check_path(path)
+    path = require_file(path)
     try:
         size = path.stat().st_size
         if size > MOST_BYTES:
             raise InputError(f"{path.name} has {size / 2**30:.1f} GiB; thin the surface and export it again")
         return path.read_bytes()
     except OSError as error:
-        raise InputError(_why_not_there(path, error)) from error
-
-
-def _why_not_there(path: Path, error: OSError | ValueError) -> str:
-    if not isinstance(error, OSError):
-        return f"{str(path)!r} is no path ({error}); correct it"
-    if error.errno == errno.ELOOP:
-        return f"{path} is a link that leads back to itself; give the file that is meant"
-    if error.errno == errno.ENOENT and path.is_symlink():
-        return f"{path} is a link to {path.readlink()}, which does not exist; give the file that is meant"
-    if error.errno == errno.ENOENT:
-        return f"{path} does not exist; correct the path"
-    if error.errno == errno.ENOTDIR:
-        return f"{path} does not exist, since a part of it is a file and no folder; correct the path"
-    if error.errno in (errno.EACCES, errno.EPERM):
-        return f"{path} may not be read by you; change its permissions or copy it"
-    return f"{path} cannot be read ({error.strerror or error}); correct the path or copy the file"
+        raise InputError(why_unreadable(path, error)) from error
 
 
 # --- what it is ---------------------------------------------------------------------------------

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from naisr_model.data import formats, meshes, sheets, volumes
 from naisr_model.data.remarks import Remark, gravest_first
 from naisr_model.errors import InputError
+from naisr_model.files import require_file
 from naisr_model.frames import BOX_MARGIN, Frame
 from naisr_model.numerals import decimal_marks, read_number
 
@@ -93,7 +94,7 @@ def read_patient(path: str | Path, label: int | str | None = None) -> PatientSha
     Raises:
         InputError: when the file cannot be used, or a volume has several labels and none is chosen.
     """
-    path = formats.check_path(path)
+    path = require_file(path)
     if volumes.is_label_volume(path):
         return _from_labels(path, label)
     if label is not None:

@@ -216,11 +216,16 @@ def test_what_else_stands_there_is_told(tmp_path):
     with pytest.raises(InputError, match="is a folder; give the path of an atlas"):
         load(tmp_path)
     os.mkfifo(tmp_path / "pipe.safetensors")
-    with pytest.raises(InputError, match="no regular file"):
+    with pytest.raises(InputError, match="is a pipe"):
         load(tmp_path / "pipe.safetensors")
 
 
-MESHES = {"a.stl": "an STL mesh", "b.ply": "a PLY mesh", "c.obj": "an OBJ mesh", "d.glb": "a GLB mesh"}
+MESHES = {
+    "a.stl": r"a mesh \(STL\)",
+    "b.ply": r"a mesh \(PLY\)",
+    "c.obj": r"a mesh \(OBJ\)",
+    "d.glb": r"a mesh \(GLB\)",
+}
 
 
 def test_files_of_patients_are_told_by_their_contents(tmp_path, ball, capsys):

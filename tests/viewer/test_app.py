@@ -108,7 +108,7 @@ def test_a_missing_file_is_one_sentence_and_code_2(capsys, tmp_path):
     assert app.main([str(tmp_path / "none.safetensors")]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1
-    assert "there is no file" in error
+    assert "does not exist; give the path of an atlas" in error
 
 
 def test_an_unknown_option_is_one_sentence_and_code_2(capsys):

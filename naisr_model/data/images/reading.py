@@ -9,6 +9,7 @@ from naisr_model.data.images.base import Image, beginning, content
 from naisr_model.data.images.nifti import read_nifti
 from naisr_model.data.images.nrrd import read_nrrd
 from naisr_model.errors import InputError
+from naisr_model.files import require_file
 
 FOREIGN = {
     rb"(?s).{344}ni1|.{4}ni2": "one half of a pair of header and image; save it as one file, .nii or .nii.gz",
@@ -46,8 +47,7 @@ def read_image(path: str | Path) -> Image:
         InputError: when the file is missing, damaged, cut off or too large, in another format, no single
             volume of numbers, or does not say where its voxels are.
     """
-    path = Path(path)
-    _require_file(path)
+    path = require_file(path)
     start = beginning(path, _START_BYTES)
     if _NIFTI.match(start):
         return read_nifti(path.name, content(path))
@@ -59,18 +59,7 @@ def read_image(path: str | Path) -> Image:
     raise _not_known(path, start)
 
 
-def _require_file(path: Path) -> None:
-    if path.is_dir():
-        raise InputError(f"{path} is a folder; give a file in it")
-    if not path.exists():
-        raise InputError(f"{path} does not exist; correct the path")
-    if not path.is_file():
-        raise InputError(f"{path} is no ordinary file; give a copy of what it holds")
-
-
 def _not_known(path: Path, start: bytes) -> InputError:
-    if not path.stat().st_size:
-        return InputError(f"{path.name} is empty; copy or export it again")
     for magic, what in STRANGE.items():
         if re.match(magic, start):
             return InputError(f"{path.name} is {what}")

@@ -77,7 +77,10 @@ def test_a_mesh_of_the_atlas_is_written_in_millimetres(naisr, egg_atlas, tmp_pat
         (["mesh", "ATLAS", "x.doc"], "name the file .stl, .ply, .obj, .vtp or .glb"),
         (["mesh", "ATLAS", "x.stl", "--effect", "age"], "--set age=VALUE"),
         (["mesh", "ATLAS", "x.stl", "--effect", "size"], "unknown covariate 'size'; this atlas has age, sex"),
-        (["mesh", "nowhere.safetensors", "x.stl"], "there is no file nowhere.safetensors"),
+        (
+            ["mesh", "nowhere.safetensors", "x.stl"],
+            "does not exist; give the path of an atlas",
+        ),
         (["train", "nowhere", "--out", "x.safetensors"], "run 'naisr prepare' first"),
         (["train", "STORE", "--out", "x.safetensors", "--preset", "huge"], "there is no preset 'huge'"),
         (["train", "STORE", "--out", "x.safetensors", "--time-budget", "soon"], "write it as 90s"),

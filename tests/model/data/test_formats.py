@@ -12,10 +12,11 @@ from pathlib import Path
 import pytest
 from shapes import binary_stl, block, text_stl
 
-from naisr_model.data.formats import check_path, content_of
+from naisr_model.data.formats import content_of
 from naisr_model.data.meshes import read_mesh
 from naisr_model.data.patients import read_patient
 from naisr_model.errors import InputError
+from naisr_model.files import require_file
 
 
 def zipped(name: str, content: bytes) -> bytes:
@@ -47,7 +48,7 @@ def test_what_is_no_file_is_named(tmp_path):
         "a\0b.stl": "is no path",
     }
     for name, match in said.items():
-        for read in (check_path, content_of, read_mesh, read_patient):
+        for read in (require_file, content_of, read_mesh, read_patient):
             with pytest.raises(InputError, match=match):
                 read(tmp_path / name)
     with pytest.raises(InputError, match="is a device"):
