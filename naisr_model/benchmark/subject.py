@@ -35,7 +35,7 @@ class Scope:
     growth: tuple[int, int] = (64, 512)
     memory: int = 512
     repeats: int = 3
-    shapes: int = 16
+    shapes: int = 8
     training: str = "paper-airway"
     frames: int = 40
     people: int = 30
