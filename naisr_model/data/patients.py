@@ -21,7 +21,7 @@ from naisr_model.data import formats, meshes, sheets, volumes
 from naisr_model.data.remarks import Remark, gravest_first
 from naisr_model.errors import InputError
 from naisr_model.frames import BOX_MARGIN, Frame
-from naisr_model.numerals import decimal_marks, read_number
+from naisr_model.numerals import LARGEST, decimal_marks, read_number
 
 POINT_ENDINGS = {".csv", ".txt", ".xyz"}
 """Text files of points that :func:`read_patient` knows, beside the meshes and the label volumes."""
@@ -160,10 +160,9 @@ def read_points(path: str | Path) -> NDArray[np.float64]:
         if len(line.cells) <= max(wide):
             raise InputError(f"{path.name} row {line.number} is a line without three numbers; correct it")
     cells = [[line.cells[column] for column in wide] for line in body]
-    points = _coordinates(path, cells, [line.number for line in body])
-    if not len(points) or not np.isfinite(points).all():
-        raise InputError(f"{path.name} has no points or some that are not finite numbers; export it again")
-    return points
+    if not cells:
+        raise InputError(f"{path.name} has a header and no points; export it again")
+    return _coordinates(path, cells, [line.number for line in body])
 
 
 def _coordinates(path: Path, cells: list[list[str]], numbers: list[int]) -> NDArray[np.float64]:
@@ -171,7 +170,9 @@ def _coordinates(path: Path, cells: list[list[str]], numbers: list[int]) -> NDAr
     flat = [cell for row in cells for cell in row]
     if not any("," in cell or "_" in cell for cell in flat):
         with contextlib.suppress(ValueError):
-            return np.array(flat, dtype=np.str_).astype(np.float64).reshape(-1, 3)
+            points = np.array(flat, dtype=np.str_).astype(np.float64).reshape(-1, 3)
+            if (np.abs(points) <= LARGEST).all():
+                return points
     marks = decimal_marks(flat)
     points = np.zeros((len(cells), 3))
     for i, row in enumerate(cells):
@@ -192,6 +193,8 @@ def _columns(path: Path, first: Sequence[str]) -> tuple[int, ...]:
     names = [sheets.split_title(part)[0].lower() for part in first]
     if not {"x", "y", "z"} <= set(names):
         raise InputError(f"{path.name} has no columns x, y and z in '{','.join(first)[:60]}'; name them so")
+    if doubled := [axis for axis in "xyz" if names.count(axis) > 1]:
+        raise InputError(f"{path.name} has the column '{doubled[0]}' twice; rename one")
     return tuple(names.index(axis) for axis in "xyz")
 
 
@@ -272,6 +275,9 @@ def _unusable(patient: PatientShape) -> Remark | None:
         return Remark("refuse", "empty", sentence, "export the surface again")
     if not np.isfinite(points).all():
         return Remark("refuse", "numbers", "some coordinates are not finite numbers", "export it again")
+    if (largest := np.abs(points).max()) > LARGEST:
+        sentence = f"the shape has coordinates up to {largest:.3g} mm"
+        return Remark("refuse", "numbers", sentence, "check its unit (--scale), or export it again")
     if _is_flat(patient):
         return Remark("refuse", "flat", "the shape is flat and bounds no body", "check how it was exported")
     return None
