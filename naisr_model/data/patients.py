@@ -52,6 +52,7 @@ class PatientShape:
         from_file: 4x4, coordinates as they were read to those of ``mesh_mm``, by every repair and
             motion since; landmarks of the file go the same way.
         unit_mm: how long a unit of the file is.
+        is_unit_stated: whether the file says so itself, so that no guess overrules it.
         units_known: whether a person said how long a unit is, so that it is not guessed.
     """
 
@@ -61,6 +62,7 @@ class PatientShape:
     remarks: tuple[Remark, ...] = ()
     from_file: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
     unit_mm: float = 1.0
+    is_unit_stated: bool = False
     units_known: bool = False
 
     @property
@@ -132,7 +134,14 @@ def _from_labels(path: Path, label: int | str | None) -> PatientShape:
     volume, chosen = volumes.choose(path.name, volumes.read_labels(path), label)
     surface = volumes.label_surface(volume, chosen)
     remarks = (*volume.remarks, *volumes.label_remarks(volume, chosen, surface))
-    return PatientShape(surface, f"{path.name}, label {volumes.titled(volume, chosen)}", "LPS", remarks)
+    return PatientShape(
+        surface,
+        f"{path.name}, label {volumes.titled(volume, chosen)}",
+        "LPS",
+        remarks,
+        unit_mm=volume.unit_mm or 1.0,
+        is_unit_stated=volume.unit_mm is not None,
+    )
 
 
 def read_points(path: str | Path) -> NDArray[np.float64]:
@@ -301,23 +310,25 @@ def _units(patient: PatientShape, main_mm: NDArray[np.float64], frame: Frame) ->
     low, high = PLAUSIBLE_SIZE
     if low <= longest / largest_mm <= high:
         return None
-    sentence = f"the shape is {longest:.3g} mm long, the atlas's shapes are up to {largest_mm:.0f} mm"
+    stated = "by the unit that the file states, " if patient.is_unit_stated else ""
+    size = f"the shape is {longest:.3g} mm long, the atlas's shapes are up to {largest_mm:.0f} mm"
+    sentence = f"{stated}{size}"
     units = {} if patient.units_known else UNITS_MM
     fits = {
         unit: mm for unit, mm in units.items() if low <= longest * mm / patient.unit_mm / largest_mm <= high
     }
     if fits:
-        return _guessed(fits, sentence, patient.unit_mm)
+        return _guessed(fits, sentence, patient.unit_mm, alone=not stated)
     # Of known units, a short shape may be a small part; nothing makes a long one right.
     part = patient.units_known and longest < low * largest_mm
     remedy = "scale it to millimetres (--scale), or check that it is this anatomy"
     return _Fault(Remark("look" if part else "refuse", "units", sentence, remedy))
 
 
-def _guessed(fits: Mapping[str, float], sentence: str, unit_mm: float) -> _Fault:
-    """One unit that explains the size is taken; among several a person has to choose."""
+def _guessed(fits: Mapping[str, float], sentence: str, unit_mm: float, *, alone: bool) -> _Fault:
+    """One unit that alone explains the size is taken; among several a person has to choose."""
     guess = f"{sentence}, so its numbers look like {' or '.join(fits)}"
-    if len(fits) > 1:
+    if len(fits) > 1 or not alone:
         choices = " or ".join(f"--scale {mm:g} for {unit}" for unit, mm in fits.items())
         return _Fault(Remark("refuse", "units", guess, f"say which they are (Unit in the window): {choices}"))
     (mm,) = fits.values()

@@ -33,6 +33,9 @@ TELLING_LINES = 1000
 LARGEST_BYTES = 200_000_000
 """A table of a million rows is smaller."""
 
+# Of a cell, by default 131,072 letters; beyond it Python's reader gives up, while a table of one may be read.
+csv.field_size_limit(LARGEST_BYTES)
+
 _MARKS = {
     b"\xef\xbb\xbf": "utf-8-sig",
     b"\xff\xfe\x00\x00": "utf-32",

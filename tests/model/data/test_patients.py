@@ -99,7 +99,7 @@ BAD_TEXTS = {
     "names.csv": ("a,b,c\n1,2,3\n", "no columns x, y and z"),
     "short.xyz": ("1 2 3\n4 5\n", "a line without three numbers"),
     "letters.xyz": ("1 2 3\n4 5 six\n", "a line without three numbers"),
-    "nan.xyz": ("1 2 3\n4 5 nan\n", "not finite"),
+    "nan.xyz": ("1 2 3\n4 5 nan\n", "missing value"),
     "head.csv": ("x,y,z\n", "no points"),
 }
 
