@@ -260,8 +260,9 @@ def _counted(pieces: int) -> str:
 
 
 def cleaned(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
-    """Merge duplicated vertices, weld gaps of rounding, drop collapsed and repeated faces, and wind neighbours alike.
+    """Merge duplicated vertices, drop collapsed and repeated faces, and wind neighbours alike.
 
+    Corners of open edges that rounding took apart become one, see :data:`GAP_SHARE`.
     Faces without area that have three corners are kept: without them there would be a slit.
     """
     mesh = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)

@@ -134,9 +134,9 @@ def _misread(name: str, magic: str, fields: Sequence[str]) -> InputError:
     """A header that cannot be parsed: its first line that cannot be parsed alone is the one to blame."""
     wrong = next((line for line in fields if not _is_parsed([magic, line])), "")
     if not wrong or not _is_parsed([magic]):
-        return InputError(f"{name} has a damaged header, which begins with '{magic[:40]}'; export it again")
+        return InputError(f"{name} has a damaged header, which begins with {magic[:40]!r}; export it again")
     meant = "numbers" if wrong.split(":")[0] in NUMBERS else "a value of NRRD"
-    return InputError(f"{name} has a damaged header: '{wrong[:60]}' gives no {meant}; export it again")
+    return InputError(f"{name} has a damaged header: {wrong[:60]!r} gives no {meant}; export it again")
 
 
 def _is_parsed(lines: Sequence[str]) -> bool:
