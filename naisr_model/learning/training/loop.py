@@ -68,7 +68,7 @@ def train(
 def _train(task: Task, report: Callable[[Report], None] | None, progress: Progress) -> Checkpoint:
     state = initial_state(task)
     resume(state, task)
-    _require_sound(task, progress)
+    _require_sound(task, progress if state.share(task) < 1 else SILENT)
     first, began, saved = state.iteration, time.monotonic(), time.monotonic()
     with Log(task.folder / "tensorboard", state.iteration) as log:
         while state.share(task) < 1:
