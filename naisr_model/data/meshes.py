@@ -41,6 +41,12 @@ SLIT_SHARE = 1e-4
 OVERLAP_SHARE = 5e-3
 """Of the area; where more of it lies inside the shape or twice, the outside is taken alone."""
 
+GAP_SHARE = 1e-3
+"""Of the usual edge; corners of open edges that are nearer to each other were rounded apart."""
+
+_CORNERS = 12
+"""So many triangles that were written one by one have a corner at the same place, rarely more."""
+
 FAR = 1.0
 """Pieces further from the main one than this share of its longest side are debris."""
 
@@ -157,9 +163,8 @@ def _parts(name: str, kind: str, content: bytes) -> Parts:
     except InputError:
         raise
     except Exception as error:  # the readers raise whatever they like on damaged files
-        gist = " ".join(str(error).split())[:120] or type(error).__name__
         raise InputError(
-            f"{name} cannot be read as {formats.MESHES[kind]} ({gist}); export it again"
+            f"{name} is a damaged {formats.MESHES[kind]} file and cannot be read; copy or export it again"
         ) from error
     if parts.lines and not len(parts.faces):
         raise InputError(f"{name} holds lines, no surface; export the surface itself")
@@ -257,11 +262,12 @@ def _counted(pieces: int) -> str:
 def cleaned(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     """Merge duplicated vertices, drop collapsed and repeated faces, and wind neighbours alike.
 
+    Corners of open edges that rounding took apart become one, see :data:`GAP_SHARE`.
     Faces without area that have three corners are kept: without them there would be a slit.
     """
     mesh = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    faces = np.asarray(mesh.faces, np.int64)
+    faces = _welded(np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64))
     faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
     once = _without_doubles(faces)
     # Where surfaces touch, the same face twice may be what closes them.
@@ -272,6 +278,24 @@ def cleaned(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
         return mesh
     faces, _ = igl.bfs_orient(np.asarray(mesh.faces, np.int64))
     return trimesh.Trimesh(mesh.vertices, faces, process=False)
+
+
+def _welded(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Faces whose open edges share their ends where these are nearer than :data:`GAP_SHARE`."""
+    edge, count = _edges(faces)
+    open_sides = (count % 2 == 1)[edge].reshape(-1, 3)
+    if not open_sides.any():
+        return faces
+    sides = vertices[faces] - vertices[np.roll(faces, -1, axis=1)]
+    gap = GAP_SHARE * float(np.median(np.linalg.norm(sides, axis=2)))
+    ends = np.unique(np.concatenate([faces[open_sides], np.roll(faces, -1, axis=1)[open_sides]]))
+    near, other = cKDTree(vertices[ends]).query(vertices[ends], _CORNERS, distance_upper_bound=gap)
+    one = np.repeat(np.arange(len(ends)), _CORNERS).reshape(-1, _CORNERS)[np.isfinite(near)]
+    graph = coo_array((np.ones(len(one)), (one, other[np.isfinite(near)])), (len(ends), len(ends)))
+    _, first, group = np.unique(connected_components(graph)[1], return_index=True, return_inverse=True)
+    target = np.arange(len(vertices))
+    target[ends] = ends[first[group]]
+    return target[faces]
 
 
 def _without_doubles(faces: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -22,7 +22,7 @@ from naisr_model.data.remarks import Remark, gravest_first
 from naisr_model.errors import InputError
 from naisr_model.files import require_file
 from naisr_model.frames import BOX_MARGIN, Frame
-from naisr_model.numerals import decimal_marks, read_number
+from naisr_model.numerals import LARGEST, decimal_marks, read_number
 
 POINT_ENDINGS = {".csv", ".txt", ".xyz"}
 """Text files of points that :func:`read_patient` knows, beside the meshes and the label volumes."""
@@ -53,6 +53,7 @@ class PatientShape:
         from_file: 4x4, coordinates as they were read to those of ``mesh_mm``, by every repair and
             motion since; landmarks of the file go the same way.
         unit_mm: how long a unit of the file is.
+        is_unit_stated: whether the file says so itself, so that no guess overrules it.
         units_known: whether a person said how long a unit is, so that it is not guessed.
     """
 
@@ -62,6 +63,7 @@ class PatientShape:
     remarks: tuple[Remark, ...] = ()
     from_file: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
     unit_mm: float = 1.0
+    is_unit_stated: bool = False
     units_known: bool = False
 
     @property
@@ -133,7 +135,14 @@ def _from_labels(path: Path, label: int | str | None) -> PatientShape:
     volume, chosen = volumes.choose(path.name, volumes.read_labels(path), label)
     surface = volumes.label_surface(volume, chosen)
     remarks = (*volume.remarks, *volumes.label_remarks(volume, chosen, surface))
-    return PatientShape(surface, f"{path.name}, label {volumes.titled(volume, chosen)}", "LPS", remarks)
+    return PatientShape(
+        surface,
+        f"{path.name}, label {volumes.titled(volume, chosen)}",
+        "LPS",
+        remarks,
+        unit_mm=volume.unit_mm or 1.0,
+        is_unit_stated=volume.unit_mm is not None,
+    )
 
 
 def read_points(path: str | Path) -> NDArray[np.float64]:
@@ -161,10 +170,9 @@ def read_points(path: str | Path) -> NDArray[np.float64]:
         if len(line.cells) <= max(wide):
             raise InputError(f"{path.name} row {line.number} is a line without three numbers; correct it")
     cells = [[line.cells[column] for column in wide] for line in body]
-    points = _coordinates(path, cells, [line.number for line in body])
-    if not len(points) or not np.isfinite(points).all():
-        raise InputError(f"{path.name} has no points or some that are not finite numbers; export it again")
-    return points
+    if not cells:
+        raise InputError(f"{path.name} has a header and no points; export it again")
+    return _coordinates(path, cells, [line.number for line in body])
 
 
 def _coordinates(path: Path, cells: list[list[str]], numbers: list[int]) -> NDArray[np.float64]:
@@ -172,7 +180,9 @@ def _coordinates(path: Path, cells: list[list[str]], numbers: list[int]) -> NDAr
     flat = [cell for row in cells for cell in row]
     if not any("," in cell or "_" in cell for cell in flat):
         with contextlib.suppress(ValueError):
-            return np.array(flat, dtype=np.str_).astype(np.float64).reshape(-1, 3)
+            points = np.array(flat, dtype=np.str_).astype(np.float64).reshape(-1, 3)
+            if (np.abs(points) <= LARGEST).all():
+                return points
     marks = decimal_marks(flat)
     points = np.zeros((len(cells), 3))
     for i, row in enumerate(cells):
@@ -193,6 +203,8 @@ def _columns(path: Path, first: Sequence[str]) -> tuple[int, ...]:
     names = [sheets.split_title(part)[0].lower() for part in first]
     if not {"x", "y", "z"} <= set(names):
         raise InputError(f"{path.name} has no columns x, y and z in '{','.join(first)[:60]}'; name them so")
+    if doubled := [axis for axis in "xyz" if names.count(axis) > 1]:
+        raise InputError(f"{path.name} has the column '{doubled[0]}' twice; rename one")
     return tuple(names.index(axis) for axis in "xyz")
 
 
@@ -273,6 +285,9 @@ def _unusable(patient: PatientShape) -> Remark | None:
         return Remark("refuse", "empty", sentence, "export the surface again")
     if not np.isfinite(points).all():
         return Remark("refuse", "numbers", "some coordinates are not finite numbers", "export it again")
+    if (largest := np.abs(points).max()) > LARGEST:
+        sentence = f"the shape has coordinates up to {largest:.3g} mm"
+        return Remark("refuse", "numbers", sentence, "check its unit (--scale), or export it again")
     if _is_flat(patient):
         return Remark("refuse", "flat", "the shape is flat and bounds no body", "check how it was exported")
     return None
@@ -296,23 +311,25 @@ def _units(patient: PatientShape, main_mm: NDArray[np.float64], frame: Frame) ->
     low, high = PLAUSIBLE_SIZE
     if low <= longest / largest_mm <= high:
         return None
-    sentence = f"the shape is {longest:.3g} mm long, the atlas's shapes are up to {largest_mm:.0f} mm"
+    stated = "by the unit that the file states, " if patient.is_unit_stated else ""
+    size = f"the shape is {longest:.3g} mm long, the atlas's shapes are up to {largest_mm:.0f} mm"
+    sentence = f"{stated}{size}"
     units = {} if patient.units_known else UNITS_MM
     fits = {
         unit: mm for unit, mm in units.items() if low <= longest * mm / patient.unit_mm / largest_mm <= high
     }
     if fits:
-        return _guessed(fits, sentence, patient.unit_mm)
+        return _guessed(fits, sentence, patient.unit_mm, alone=not stated)
     # Of known units, a short shape may be a small part; nothing makes a long one right.
     part = patient.units_known and longest < low * largest_mm
     remedy = "scale it to millimetres (--scale), or check that it is this anatomy"
     return _Fault(Remark("look" if part else "refuse", "units", sentence, remedy))
 
 
-def _guessed(fits: Mapping[str, float], sentence: str, unit_mm: float) -> _Fault:
-    """One unit that explains the size is taken; among several a person has to choose."""
+def _guessed(fits: Mapping[str, float], sentence: str, unit_mm: float, *, alone: bool) -> _Fault:
+    """One unit that alone explains the size is taken; among several a person has to choose."""
     guess = f"{sentence}, so its numbers look like {' or '.join(fits)}"
-    if len(fits) > 1:
+    if len(fits) > 1 or not alone:
         choices = " or ".join(f"--scale {mm:g} for {unit}" for unit, mm in fits.items())
         return _Fault(Remark("refuse", "units", guess, f"say which they are (Unit in the window): {choices}"))
     (mm,) = fits.values()

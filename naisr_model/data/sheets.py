@@ -33,6 +33,12 @@ TELLING_LINES = 1000
 LARGEST_BYTES = 200_000_000
 """A table of a million rows is smaller."""
 
+LONGEST_CELL = 500
+"""Letters; a path is shorter, and what is longer is text that a quote without its partner holds together."""
+
+# Python's reader gives up by itself beyond 131,072 letters, which is judged here.
+csv.field_size_limit(LARGEST_BYTES)
+
 _MARKS = {
     b"\xef\xbb\xbf": "utf-8-sig",
     b"\xff\xfe\x00\x00": "utf-32",
@@ -180,7 +186,19 @@ def read_lines(path: str | Path, comment: str = "") -> tuple[list[Line], tuple[R
         text, remarks = decoded(path, data)
         lines = _delimited(path, text, comment)
     stripped = (Line(number, tuple(cell.strip() for cell in cells)) for number, cells in lines)
-    return [line for line in stripped if any(line.cells)], remarks
+    filled = [line for line in stripped if any(line.cells)]
+    for line in filled:
+        _require_short(path.name, line)
+    return filled, remarks
+
+
+def _require_short(name: str, line: Line) -> None:
+    longest = max(line.cells, key=len)
+    if len(longest) > LONGEST_CELL:
+        raise InputError(
+            f"{name} row {line.number} has a cell of {len(longest):,} letters that begins with "
+            f"'{' '.join(longest[:30].split())}'; shorten it, or look for a quote without its partner"
+        )
 
 
 def read_text(path: str | Path) -> tuple[str, tuple[Remark, ...]]:

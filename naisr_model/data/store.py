@@ -33,6 +33,8 @@ MESH = "mesh.ply"
 FARTHEST = 1e6
 """Model units beyond which a sample is damage; the box is 2 wide."""
 
+_NO_SAMPLES = "it holds what is no number or far outside of the box"
+
 
 class Draw(NamedTuple):
     """A random subset of the samples of ``S`` shapes, float32, model units.
@@ -145,24 +147,40 @@ class SampleStore:
         space, dim = np.concatenate([near, uniform], axis=1), self.frame.dim
         return Draw(surface[..., :dim], surface[..., dim:], space[..., :dim], space[..., dim])
 
-    def _block(self, row: int, kind: str, count: int, rng: np.random.Generator) -> NDArray[np.float32]:
-        # Plain reads instead of lasting memory maps: a map a file would exhaust the usual limit of
-        # 1024 open files at a few hundred shapes, and a read of a cached block costs about as little.
+    def require_sound(self, row: int, n_surface: int, n_near: int, n_uniform: int) -> None:
+        """Read all samples of a row, so that no draw of so many can fail later.
+
+        Raises:
+            InputError: as :meth:`draw`.
+        """
+        for kind, count in zip(KINDS, (n_surface, n_near, n_uniform), strict=True):
+            block = self._block_of(row, kind, count)
+            if not _are_sound(block):
+                raise _damaged(block.path, _NO_SAMPLES)
+
+    def _block_of(self, row: int, kind: str, count: int) -> _Block:
+        """Where at least so many samples lie."""
         block = self.blocks.get((row, kind)) or self._open_block(row, kind)
         if count > block.rows:
             raise InputError(
                 f"{count} {kind} samples were asked for but the store has {block.rows} a shape; "
                 f"prepare it again with more"
             )
+        return block
+
+    def _block(self, row: int, kind: str, count: int, rng: np.random.Generator) -> NDArray[np.float32]:
+        # Plain reads instead of lasting memory maps: a map a file would exhaust the usual limit of
+        # 1024 open files at a few hundred shapes, and a read of a cached block costs about as little.
+        block = self._block_of(row, kind, count)
         start = int(rng.integers(0, block.rows - count + 1))
         offset = block.offset + start * block.columns * 4
         try:
             flat = np.fromfile(block.path, np.float32, count * block.columns, offset=offset)
             drawn = flat.reshape(count, block.columns)
         except (OSError, ValueError) as error:
-            raise _damaged(block.path, str(error)) from error
+            raise _damaged(block.path, "it is cut off or cannot be read") from error
         if not (np.abs(drawn) <= FARTHEST).all():
-            raise _damaged(block.path, "it holds what is no number or far outside of the box")
+            raise _damaged(block.path, _NO_SAMPLES)
         return drawn
 
     def _open_block(self, row: int, kind: str) -> _Block:
@@ -176,13 +194,16 @@ class SampleStore:
 def _find_block(path: Path, kind: str, dim: int) -> _Block:
     try:
         array = np.lib.format.open_memmap(path, mode="r")
-        rows, columns = map(int, array.shape)
-    except (OSError, ValueError, RecursionError, MemoryError) as error:
-        raise _damaged(path, str(error)) from error
+    except OSError as error:
+        raise _damaged(path, (error.strerror or "it cannot be read").lower()) from error
+    except Exception as error:  # numpy and Python's own parser raise whatever they like on damaged headers
+        raise _damaged(path, "it is cut off, or its header is not that of samples") from error
     expected = 2 * dim if kind == "surface" else dim + 1
-    if array.dtype != np.float32 or columns != expected or not array.flags.c_contiguous:
-        raise _damaged(path, f"{array.dtype} in {columns} columns")
-    return _Block(path, int(array.offset), rows, columns)
+    if array.ndim != 2:
+        raise _damaged(path, f"it has {array.ndim} dimensions in place of rows and columns")
+    if array.dtype != np.float32 or array.shape[1] != expected or not array.flags.c_contiguous:
+        raise _damaged(path, f"{array.dtype} in {array.shape[1]} columns")
+    return _Block(path, int(array.offset), *map(int, array.shape))
 
 
 def _read_mesh(path: Path) -> trimesh.Trimesh:

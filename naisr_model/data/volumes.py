@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -56,6 +56,7 @@ class LabelVolume:
             axes are orthogonal; the determinant is negative where the index axes are left-handed.
         names: what the file calls its labels, by label; empty for most files.
         remarks: what is odd about the file.
+        unit_mm: millimetres in the unit of length that the file states; None where it states none.
         overlapping: further layers of the same file, whose labels may lie over these.
     """
 
@@ -63,6 +64,7 @@ class LabelVolume:
     to_lps_mm: NDArray[np.float64]
     names: Mapping[int, str]
     remarks: tuple[Remark, ...]
+    unit_mm: float | None = None
     overlapping: tuple[LabelVolume, ...] = ()
 
     @property
@@ -100,11 +102,12 @@ def read_labels(path: str | Path) -> LabelVolume:
             image.to_lps_mm,
             _names(image.metadata, layer, len(image.voxels)),
             image.remarks,
+            image.unit_mm,
         )
         for layer, voxels in enumerate(image.voxels)
     ]
     first, *others = layers
-    return LabelVolume(first.labels, first.to_lps_mm, first.names, first.remarks, tuple(others))
+    return replace(first, overlapping=tuple(others))
 
 
 def _whole_numbers(name: str, voxels: NDArray[Any], image: Image) -> NDArray[np.integer]:

@@ -7,7 +7,6 @@ proposal, and what ``is_ready`` can be fitted.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -38,6 +37,7 @@ from naisr_model.data.patients import (
 )
 from naisr_model.data.remarks import Remark, gravest_first
 from naisr_model.errors import InputError
+from naisr_model.numerals import LARGEST
 from naisr_model.progress import SILENT, Progress
 
 ASTRAY_POINTS, ASTRAY_PLACES = 200, 12
@@ -248,7 +248,7 @@ def _landmarks(align: Method, path: Path | None, space: Space) -> Landmarks:
 def _in_units(patient: PatientShape, scale: float | None) -> PatientShape:
     if scale is None:
         return patient
-    if not 0 < scale < math.inf:
+    if not 0 < scale <= LARGEST:
         raise InputError(f"the scale is {scale:g}; give the millimetres per unit of the file, as 1000")
     return replace(scaled(patient, scale / patient.unit_mm), units_known=True)
 

@@ -36,6 +36,7 @@ class Image:
         voxels: as stored, ``[layers, i, j, k]``; nearly all files have one layer.
         slope: what is meant is ``slope * voxels + intercept``.
         intercept: see ``slope``.
+        unit_mm: millimetres in the unit of length that the file states; None where it states none.
         to_lps_mm: 4x4, voxel indices ``(i, j, k, 1)`` of voxel centres to LPS millimetres; the axes are
             orthogonal.
         metadata: what else the file says, by key.
@@ -48,6 +49,7 @@ class Image:
     remarks: tuple[Remark, ...]
     slope: float = 1.0
     intercept: float = 0.0
+    unit_mm: float | None = None
 
 
 # --- bytes --------------------------------------------------------------------------------------

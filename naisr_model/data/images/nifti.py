@@ -28,8 +28,8 @@ from naisr_model.data.remarks import Remark
 from naisr_model.errors import InputError
 
 RAS_TO_LPS = np.diag([-1.0, -1.0, 1.0, 1.0])
-UNITS_MM = {1: 1000.0, 3: 0.001}
-"""Metres and micrometres; every other code, the one for unknown too, is taken for millimetres."""
+UNITS_MM = {1: 1000.0, 2: 1.0, 3: 0.001}
+"""Metres, millimetres and micrometres; other codes, as 0 for unknown, state no unit: millimetres, then."""
 
 _UNEQUAL = 0.01
 
@@ -53,9 +53,10 @@ def read_nifti(name: str, content: bytes) -> Image:
     slope, intercept = _scale(name, header)
     voxels, left = _voxels(name, content, header, counts, dtype)
     ras = _matrix(name, header)
-    lps_mm = squared(name, _unit_mm(header) @ RAS_TO_LPS, ras, counts)
+    unit_mm = _stated_mm(header)
+    lps_mm = squared(name, _in_mm(unit_mm) @ RAS_TO_LPS, ras, counts)
     placed = (*_position_remarks(header, ras, counts), *_spacing_remarks(header, ras))
-    return Image(voxels[None], lps_mm, {}, (*placed, *surplus(left)), slope, intercept)
+    return Image(voxels[None], lps_mm, {}, (*placed, *surplus(left)), slope, intercept, unit_mm)
 
 
 def _header(name: str, content: bytes) -> Any:
@@ -146,8 +147,12 @@ def _qform(header: Any) -> NDArray[np.float64] | None:
     return matrix if np.isfinite(matrix).all() else None
 
 
-def _unit_mm(header: Any) -> NDArray[np.float64]:
-    factor = UNITS_MM.get(int(header["xyzt_units"]) & 7, 1.0)
+def _stated_mm(header: Any) -> float | None:
+    return UNITS_MM.get(int(header["xyzt_units"]) & 7)
+
+
+def _in_mm(unit_mm: float | None) -> NDArray[np.float64]:
+    factor = unit_mm or 1.0
     return np.diag([factor, factor, factor, 1.0])
 
 
@@ -157,7 +162,7 @@ def _position_remarks(header: Any, used: NDArray[np.float64], counts: list[int])
     other = _qform(header) if _is_coded(header, "qform") else used
     if other is None or shift(used, other, counts) <= MOST_SHIFT:
         return ()
-    most_mm = np.linalg.norm(apart(used, other, counts), axis=0).max() * _unit_mm(header)[0, 0]
+    most_mm = np.linalg.norm(apart(used, other, counts), axis=0).max() * (_stated_mm(header) or 1.0)
     sentence = (
         f"the file places the image in two ways, which differ by up to {most_mm:.3g} mm (sform and qform); "
         "the sform is used"
@@ -169,7 +174,7 @@ def _spacing_remarks(header: Any, used: NDArray[np.float64]) -> tuple[Remark, ..
     told, steps = np.asarray(header["pixdim"][1:4], np.float64), np.linalg.norm(used[:3, :3], axis=0)
     if (np.abs(told - steps) <= _UNEQUAL * steps).all():
         return ()
-    unit = _unit_mm(header)[0, 0]
+    unit = _stated_mm(header) or 1.0
     one, other = (" x ".join(f"{step * unit:.3g}" for step in each) for each in (told, steps))
     sentence = f"the file gives its voxels {one} mm (pixdim) and {other} mm (sform); the latter is used"
     return (Remark("look", "spacing", sentence, "compare the volume with the one you expect"),)

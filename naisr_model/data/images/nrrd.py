@@ -68,6 +68,12 @@ FIELDS = {
 }
 """What matters; what other fields hold cannot stop a file from being read."""
 
+NUMBERS = {
+    *("dimension", "sizes", "spacings", "space dimension", "space directions", "space origin"),
+    *("line skip", "byte skip"),
+}
+"""Those of them that hold numbers."""
+
 MOST_NUMBERS = 1 << 24
 """Of voxels that are written as text, each of which takes a hundred bytes while it is parsed."""
 
@@ -101,9 +107,11 @@ def read_nrrd(path: Path, content: bytes) -> Image:
     matrix = np.eye(4)
     matrix[:3, :3] = directions[spatial].T
     matrix[:3, 3], origin_remarks = _origin(header)
-    lps_mm = squared(path.name, _to_lps_mm(path.name, header), matrix, size)
+    unit_mm = _stated_mm(path.name, header)
+    lps_mm = squared(path.name, _to_lps_mm(header, unit_mm or 1.0), matrix, size)
     unknown = () if is_placed and _word(header, "space") in SIGNS_TO_LPS else (unplaced(),)
-    return Image(voxels, lps_mm, metadata, (*unknown, *origin_remarks, *surplus(left)))
+    remarks = (*unknown, *origin_remarks, *surplus(left))
+    return Image(voxels, lps_mm, metadata, remarks, unit_mm=unit_mm)
 
 
 def _header(name: str, content: bytes) -> tuple[dict[str, Any], dict[str, str]]:
@@ -118,8 +126,28 @@ def _header(name: str, content: bytes) -> tuple[dict[str, Any], dict[str, str]]:
         with np.errstate(invalid="ignore"):  # sizes that no integer holds
             header = nrrd.read_header(iter([magic, *kept]))
     except (nrrd.NRRDError, *_DAMAGED) as error:
-        raise InputError(f"{name} has a damaged header ({error}); export it again") from error
+        raise _misread(name, magic, kept) from error
     return dict(header), {key.strip(): value.strip() for key, value in pairs}
+
+
+def _misread(name: str, magic: str, fields: Sequence[str]) -> InputError:
+    """A header that cannot be parsed: its first line that cannot be parsed alone is the one to blame."""
+    wrong = next((line for line in fields if not _is_parsed([magic, line])), "")
+    if not wrong or not _is_parsed([magic]):
+        return InputError(f"{name} has a damaged header, which begins with {magic[:40]!r}; export it again")
+    meant = "numbers" if wrong.split(":")[0] in NUMBERS else "a value of NRRD"
+    return InputError(f"{name} has a damaged header: {wrong[:60]!r} gives no {meant}; export it again")
+
+
+def _is_parsed(lines: Sequence[str]) -> bool:
+    import nrrd
+
+    try:
+        with np.errstate(invalid="ignore"):
+            nrrd.read_header(iter(lines))
+    except (nrrd.NRRDError, *_DAMAGED):
+        return False
+    return True
 
 
 def _decoded(content: bytes) -> str:
@@ -206,22 +234,27 @@ def _origin(header: Mapping[str, Any]) -> tuple[NDArray[np.float64], tuple[Remar
     return np.zeros(3), (Remark("look", "origin", sentence, "align it to the atlas"),)
 
 
-def _to_lps_mm(name: str, header: Mapping[str, Any]) -> NDArray[np.float64]:
+def _to_lps_mm(header: Mapping[str, Any], unit_mm: float) -> NDArray[np.float64]:
     """World axes of the file to LPS in millimetres; an unnamed space is left as it is."""
     signs = np.array(SIGNS_TO_LPS.get(_word(header, "space"), (1, 1, 1)), np.float64)
-    return np.diag([*(signs * _units_mm(name, header)), 1.0])
+    return np.diag([*(signs * unit_mm), 1.0])
 
 
-def _units_mm(name: str, header: Mapping[str, Any]) -> list[float]:
-    """Millimetres per unit of each world axis; units of the index axes count where all are the same."""
+def _stated_mm(name: str, header: Mapping[str, Any]) -> float | None:
+    """Millimetres per unit of the world; None where it is not stated.
+
+    Units of the index axes count where those of the world are not given.
+    """
     units = header.get("space units") or sorted(set(map(str, header.get("units", ()))) - {""})
     units = [str(unit).strip().lower() for unit in units]
     unknown = [unit for unit in units if _singular(unit) not in UNITS_MM]
     if unknown or len(units) not in (0, 1, 3):
         told = ", ".join(units)
         raise InputError(f"{name} gives its size in '{told}'; export it in mm")
-    factors = [UNITS_MM[_singular(unit)] for unit in units]
-    return factors if len(factors) == 3 else (factors or [1.0]) * 3
+    factors = {UNITS_MM[_singular(unit)] for unit in units if unit}
+    if len(factors) > 1:
+        raise InputError(f"{name} has axes in different units ({', '.join(units)}); export it in mm")
+    return factors.pop() if factors else None
 
 
 def _singular(unit: str) -> str:
@@ -267,7 +300,7 @@ def _parsed(name: str, data: bytes, count: int) -> NDArray[np.float64]:
     try:
         numbers = np.array(data.split(), np.float64)
     except ValueError as error:
-        raise InputError(f"{name} has voxels that are no numbers ({error}); export it again") from error
+        raise InputError(f"{name} has voxels that are no numbers; export it again") from error
     if len(numbers) < count:
         raise InputError(
             f"{name} is cut off: it announces {count:,} voxels and has {len(numbers):,}; copy it again"
@@ -284,7 +317,8 @@ def _dtype(name: str, header: Mapping[str, Any]) -> np.dtype:
     try:
         dtype = nrrd.read_data(one, io.BytesIO(bytes(16))).dtype
     except (nrrd.NRRDError, *_DAMAGED) as error:
-        raise InputError(f"{name} has voxels of an unknown type ({error}); export it again") from error
+        told_type = f"'{told.get('type', '')[:40]}'"
+        raise InputError(f"{name} has voxels of the unknown type {told_type}; export it again") from error
     if dtype.kind not in "iuf":
         raise InputError(f"{name} does not hold numbers; save whole-number labels")
     return dtype

@@ -36,6 +36,8 @@ def read(name: str, content: bytes) -> Parts:
         )
     if not modes[_TRIANGLES] and not modes[_STRIP] and lines:
         return Parts(np.zeros((1, 3)), NO_FACES, lines)
+    if not modes.total() or not tree.get("scenes") or not tree.get("nodes"):
+        raise InputError(f"{name} holds no scene with a surface in it; export the surface again")
     (length,) = struct.unpack_from("<I", content, 8)
     scene = trimesh.load_scene(io.BytesIO(content[:length]), file_type="glb", process=False)
     dumped = scene.dump()

@@ -68,6 +68,7 @@ def train(
 def _train(task: Task, report: Callable[[Report], None] | None, progress: Progress) -> Checkpoint:
     state = initial_state(task)
     resume(state, task)
+    _require_sound(task, progress if state.share(task) < 1 else SILENT)
     first, began, saved = state.iteration, time.monotonic(), time.monotonic()
     with Log(task.folder / "tensorboard", state.iteration) as log:
         while state.share(task) < 1:
@@ -97,6 +98,15 @@ def _train(task: Task, report: Callable[[Report], None] | None, progress: Progre
     _require_finite(state, task)
     save(state, task)
     return save(state, task, measured(state, task))
+
+
+def _require_sound(task: Task, progress: Progress) -> None:
+    """Stop before anything is written where samples are damaged, that no later batch meets them."""
+    config = task.config
+    for row in task.rows:
+        task.store.require_sound(row, config.surface_points, config.near_points, config.uniform_points)
+        if progress.is_unwanted():
+            raise Cancelled
 
 
 def _judge(total: float, state: State, task: Task) -> None:

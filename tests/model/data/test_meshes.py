@@ -133,6 +133,21 @@ def test_vertices_that_are_not_numbers_are_rejected(tmp_path, ellipsoid):
         read_mesh(tmp_path / "nan.ply")
 
 
+@pytest.mark.parametrize("gap_mm", [1e-6, 1e-5])
+def test_triangles_that_rounding_took_apart_are_one_surface(ellipsoid, gap_mm):
+    corners = ellipsoid.vertices[ellipsoid.faces].reshape(-1, 3)
+    apart = corners + np.random.default_rng(0).uniform(-gap_mm, gap_mm, corners.shape)
+    soup = trimesh.Trimesh(apart, np.arange(len(apart)).reshape(-1, 3), process=False)
+    mesh = repair_mesh(soup)
+    assert mesh.is_watertight and len(mesh.vertices) == len(ellipsoid.vertices)
+    assert mesh.volume == pytest.approx(ellipsoid.volume, rel=1e-4)
+
+
+def test_a_gap_that_is_one_is_not_welded(ellipsoid):
+    wide = trimesh.Trimesh(ellipsoid.vertices, ellipsoid.faces[1:], process=False)
+    assert len(repair_mesh(wide).faces) == len(ellipsoid.faces) - 1
+
+
 def test_repair_merges_vertices_and_drops_useless_faces(ellipsoid):
     soup = trimesh.Trimesh(
         ellipsoid.triangles.reshape(-1, 3), np.arange(3 * len(ellipsoid.faces)).reshape(-1, 3), process=False

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import nibabel
 import nrrd
 import numpy as np
@@ -99,8 +101,11 @@ BAD_TEXTS = {
     "names.csv": ("a,b,c\n1,2,3\n", "no columns x, y and z"),
     "short.xyz": ("1 2 3\n4 5\n", "a line without three numbers"),
     "letters.xyz": ("1 2 3\n4 5 six\n", "a line without three numbers"),
-    "nan.xyz": ("1 2 3\n4 5 nan\n", "not finite"),
+    "nan.xyz": ("1 2 3\n4 5 nan\n", "missing value"),
     "head.csv": ("x,y,z\n", "no points"),
+    "infinite.xyz": ("1 2 3\n4 inf 6\n", "row 2 is a line without three numbers: 'inf'; expected a number"),
+    "large.xyz": ("1 2 3\n4 5 1e308\n", "row 2 .*'1e308', larger than anything that is measured"),
+    "twice.csv": ("x,y,z,x [mm]\n1,2,3,4\n", "has the column 'x' twice; rename one"),
 }
 
 
@@ -185,6 +190,23 @@ def test_units_are_guessed_and_set_right(unit, mm):
     (told,) = right.remarks
     assert (told.severity, told.topic) == ("fine", "units") and told.text.endswith(f"it was scaled by {mm:g}")
     assert check_patient(right, FRAME) == ()
+
+
+def test_a_unit_that_the_file_states_is_not_overruled():
+    patient = replace(scaled(PatientShape(body()), 0.001), is_unit_stated=True)
+    (remark,) = check_patient(patient, FRAME)
+    assert (remark.severity, remark.topic) == ("refuse", "units")
+    assert remark.sentence.startswith("by the unit that the file states, the shape is 0.12 mm long")
+    assert remark.sentence.endswith("so its numbers look like metres")
+    assert remark.remedy.endswith("--scale 1000 for metres")
+    assert repaired(patient, FRAME) is patient
+    assert check_patient(replace(PatientShape(body()), is_unit_stated=True), FRAME) == ()
+
+
+def test_coordinates_of_no_body_are_refused():
+    (remark,) = check_patient(scaled(PatientShape(body()), 1e15), FRAME)
+    assert (remark.severity, remark.topic) == ("refuse", "numbers")
+    assert "coordinates up to" in remark.sentence and "--scale" in remark.remedy
 
 
 def test_two_units_that_explain_a_size_are_not_guessed_between():

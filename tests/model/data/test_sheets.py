@@ -164,3 +164,12 @@ def test_points_that_may_mean_two_things_are_refused(tmp_path):
         (tmp_path / "points.csv").write_text(text)
         with pytest.raises(InputError, match="three numbers"):
             read_points(tmp_path / "points.csv")
+
+
+@pytest.mark.parametrize("count", [501, 200_000])
+def test_a_cell_that_is_a_text_is_told_in_a_short_sentence(tmp_path, count):
+    path = tmp_path / "t.csv"
+    path.write_text(f"subject,age\na,{'M' * count}\nb,5\n")
+    with pytest.raises(InputError, match=rf"t\.csv row 2 has a cell of {count:,} letters") as error:
+        read_sheet(path)
+    assert len(str(error.value)) < 200

@@ -224,3 +224,42 @@ def test_samples_that_are_no_numbers_are_explained_and_made_again(store, wrong):
     with pytest.raises(InputError, match=r"uniform\.npy is damaged \(it holds what is no number"):
         drawn(store.path, 0)
     assert not is_whole(folder, counts, 3)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (np.zeros(12, np.float32), "1 dimensions in place of rows and columns"),
+        (np.zeros((2, 3, 4), np.float32), "3 dimensions in place of rows and columns"),
+        (np.zeros((60, 6), np.float64), "float64 in 6 columns"),
+        (b"\x93NUMPY\x01\x00\x14\x00{'descr': ('<f4', \n\n", "its header is not that of samples"),
+        (b"\x93NUMPY\x01\x00\x14\x00{'shape': range    }\n", "its header is not that of samples"),
+        (b"no samples", "its header is not that of samples"),
+    ],
+)
+def test_files_that_are_no_samples_are_explained_before_any_is_drawn(store, content, said):
+    path = store.path / "shapes" / "shape1" / "surface.npy"
+    if isinstance(content, bytes):
+        path.write_bytes(content)
+    else:
+        np.save(path, content)
+    opened = SampleStore.open(store.path)
+    row = opened.folders.index("shape1")
+    with pytest.raises(InputError, match=rf"surface\.npy is damaged \(.*{said}\); run 'naisr prepare' again"):
+        opened.require_sound(row, 1, 1, 1)
+
+
+def test_one_sample_of_many_that_is_no_number_is_found_before_any_is_drawn(store):
+    path = store.path / "shapes" / "shape1" / "near.npy"
+    samples = np.load(path)
+    samples[-1, -1] = np.nan
+    np.save(path, samples)
+    opened = SampleStore.open(store.path)
+    opened.require_sound(1 - opened.folders.index("shape1"), 1, 1, 1)
+    with pytest.raises(InputError, match=r"near\.npy is damaged \(it holds what is no number"):
+        opened.require_sound(opened.folders.index("shape1"), 1, 1, 1)
+
+
+def test_more_samples_than_there_are_are_refused_before_any_is_drawn(store):
+    with pytest.raises(InputError, match="81 near samples were asked for but the store has 80"):
+        SampleStore.open(store.path).require_sound(0, 1, 81, 1)

@@ -82,3 +82,23 @@ def test_an_alignment_tells_how_far_it_is_and_can_be_stopped(egg_atlas, tmp_path
     assert told == sorted(told) and told[-1] == 1.0
     with pytest.raises(Cancelled):
         take_in(path, atlas, {}, align="icp", progress=Progress(is_unwanted=lambda: True))
+
+
+@pytest.mark.parametrize("scale", [0.0, -1.0, 1e13, 1e300, float("inf"), float("nan")])
+def test_a_scale_of_no_unit_is_refused(egg_atlas, tmp_path, scale):
+    with pytest.raises(InputError, match=r"the scale is .*; give the millimetres per unit of the file"):
+        read(saved(egg(6.0, 1.0), tmp_path / "egg.stl"), Atlas.load(egg_atlas), scale=scale)
+
+
+def test_a_volume_of_another_unit_than_it_states_is_read_once_the_unit_is_told(egg_atlas, tmp_path):
+    path = label_volume(tmp_path / "scan.nrrd")
+    content = path.read_bytes()
+    start, mark, rest = content.partition(b"\nspace:")
+    assert mark
+    path.write_bytes(start + b'\nspace units: "m" "m" "m"' + mark + rest)
+    atlas = Atlas.load(egg_atlas)
+    found = read(path, atlas, label=2)
+    assert not found.is_ready and found.found[0].topic == "units"
+    assert "look like millimetres" in found.found[0].sentence
+    told = read(path, atlas, label=2, scale=1.0)
+    assert told.is_ready and told.patient.volume_cm3 == pytest.approx(TRUE_CM3, rel=0.01)

@@ -302,9 +302,9 @@ def test_a_damaged_qform_is_refused_where_it_counts(tmp_path):
 def test_units_of_nifti_count(tmp_path, unit, mm):
     image = header_of(np.diag([*np.array(STEPS) / mm, 1]))
     image.header.set_xyzt_units(unit)
-    np.testing.assert_allclose(
-        read_image(nifti(image, tmp_path / "a.nii")).to_lps_mm, RAS @ np.diag([*STEPS, 1])
-    )
+    read = read_image(nifti(image, tmp_path / "a.nii"))
+    np.testing.assert_allclose(read.to_lps_mm, RAS @ np.diag([*STEPS, 1]))
+    assert read.unit_mm == (None if unit == "unknown" else mm)
 
 
 @pytest.mark.parametrize(
@@ -330,6 +330,7 @@ def test_units_of_nrrd_count(tmp_path, unit, mm):
     image = read_image(path)
     np.testing.assert_allclose(image.to_lps_mm, expected)
     assert {remark.topic for remark in image.remarks} == {"orientation", "origin"}
+    assert image.unit_mm == (mm if unit else None)
 
 
 REFUSED = {
@@ -341,7 +342,18 @@ REFUSED = {
     "none": ({"space_directions": "none none none"}, "two-dimensional|how large its voxels are"),
     "zero": ({"space_directions": "(0,0,0) (0,1,0) (0,0,1)"}, "voxels of 0 x 1 x 1 mm; set the spacing"),
     "flat space": ({"space_directions": "(1,0) (0,1) (1,1)"}, "not three-dimensional"),
-    "words": ({"space_directions": "(1;0;0) (0;1;0) (0;0;1)"}, "damaged header"),
+    "units": (
+        {"space_units": '"mm" "m" "mm"'},
+        r"has axes in different units \(mm, m, mm\); export it in mm",
+    ),
+    "words": (
+        {"space_directions": "(1;0;0) (0;1;0) (0;0;1)"},
+        r"damaged header: 'space directions: \(1;0;0\) .*' gives no numbers; export it again",
+    ),
+    "letters": ({"sizes": "a b c"}, "damaged header: 'sizes: a b c' gives no numbers; export it again"),
+    "letter": ({"dimension": "x"}, "damaged header: 'dimension: x' gives no numbers; export it again"),
+    "comma": ({"space_origin": "(1;5,0,0)"}, r"'space origin: \(1;5,0,0\)' gives no numbers"),
+    "no type": ({"type": "voxel"}, "has voxels of the unknown type 'voxel'; export it again"),
     "sizes": ({"sizes": "20 24"}, "does not say how many voxels"),
     "beyond measure": (
         {"space_directions": "(1e200,0,0) (0,1,0) (0,0,1)"},

@@ -117,7 +117,9 @@ def test_lines_alone_are_no_surface(tmp_path, capfd):
         ),
         ({"extensionsUsed": ["EXT_meshopt_compression"]}, "is compressed with meshopt; export it without"),
         ({"extensionsRequired": ["KHR_mesh_quantization"]}, "needs the glTF extension KHR_mesh_quantization"),
-        ({"meshes": []}, "no faces and no points"),
+        ({"meshes": []}, "holds no scene with a surface in it; export the surface again"),
+        ({"scenes": [], "nodes": []}, "holds no scene with a surface in it"),
+        ({"accessors": []}, "is a damaged GLB file and cannot be read; copy or export it again"),
     ],
 )
 def test_a_glb_that_is_not_read_says_why(tmp_path, more, match):

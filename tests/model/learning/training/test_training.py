@@ -17,6 +17,7 @@ from eggs import egg, egg_preset
 from naisr_model.atlas import Atlas
 from naisr_model.checkpoint import load
 from naisr_model.config import FitConfig, LossWeights, SirenConfig
+from naisr_model.data.store import SampleStore
 from naisr_model.errors import Cancelled, InputError
 from naisr_model.learning.fitting.paper import fit_latents
 from naisr_model.learning.training import loop as training
@@ -366,3 +367,16 @@ def test_fitting_recovers_the_code_of_a_shape_the_atlas_can_make(egg_atlas):
     given_up = Progress(is_unwanted=lambda: True)
     with pytest.raises(Cancelled):
         fit_latents(network, lambda rng: batch, covariates, config, only_distances, progress=given_up)
+
+
+def test_damaged_samples_are_told_before_anything_is_written(egg_store, tmp_path):
+    copied = shutil.copytree(egg_store.path, tmp_path / "store")
+    store = SampleStore.open(copied)
+    path = store.folder(int(np.flatnonzero(~np.asarray(store.population.held_out))[-1])) / "near.npy"
+    samples = np.load(path)
+    samples[-1] = np.nan
+    np.save(path, samples)
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(InputError, match=r"near\.npy is damaged \(it holds what is no number"):
+        train(store, egg_preset(epochs=1), tmp_path / "a.safetensors")
+    assert [each for each in sorted(tmp_path.rglob("*")) if each not in before and each.is_file()] == []
