@@ -8,7 +8,7 @@ proposal, and what ``is_ready`` can be fitted.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -47,6 +47,10 @@ ASTRAY_SHARE = 0.05
 """Of the atlas's unit of length: a scan farther from every average shape does not lie as they do."""
 
 
+WORSE = 1.1
+"""From so many times the distance before it on, an alignment has made it worse."""
+
+
 @dataclass(frozen=True, eq=False)
 class Intake:
     """A patient's shape on its way to a fit, and what was done so far.
@@ -70,7 +74,7 @@ class Intake:
     @property
     def remarks(self) -> tuple[Remark, ...]:
         """What is odd about the file, what was repaired and what is left, gravest first."""
-        doubt = () if self.proposal is None else _doubt(self.proposal)
+        doubt = () if self.proposal is None else _doubt(self.proposal, self.method)
         return gravest_first((*self.patient.remarks, *doubt, *self.found))
 
     @property
@@ -292,8 +296,13 @@ def _told(method: Method, proposal: Proposal) -> str:
     return f"aligned by {method}, {turn}; mean distance to the atlas's shape {ends}{away}"
 
 
-def _doubt(proposal: Proposal) -> tuple[Remark, ...]:
-    if proposal.rival_deg is None:
-        return ()
-    other = f"the shape turned by another {proposal.rival_deg:.0f}° fits nearly as well"
-    return (Remark("look", "rival", other, "see whether it is upright, or align it by landmarks"),)
+def _doubt(proposal: Proposal, method: Method) -> Iterator[Remark]:
+    if proposal.after_mm > WORSE * proposal.before_mm:
+        ends = f"{proposal.before_mm:.1f} mm before, {proposal.after_mm:.1f} mm after"
+        remedy = (
+            "see whether the landmarks are of this scan" if method == "landmarks" else "leave it as it was"
+        )
+        yield Remark("look", "worse", f"the alignment made it worse: {ends}", remedy)
+    if proposal.rival_deg is not None:
+        other = f"the shape turned by another {proposal.rival_deg:.0f}° fits nearly as well"
+        yield Remark("look", "rival", other, "see whether it is upright, or align it by landmarks")

@@ -190,6 +190,7 @@ def _patient_record(patient: OpenScan) -> dict[str, Any]:
         "scan": patient.reading.path.name,
         "known": dict(patient.known),
         "fitted": None if fit is None else dict(fit.values),
+        "is_valid": None if fit is None else fit.is_valid,
         "residual_mm": None if fit is None else round(fit.residual_mm, 4),
         "lasting": None if fit is None or fit.lasting is None else round(fit.lasting, 4),
     }
