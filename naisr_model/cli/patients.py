@@ -179,7 +179,10 @@ def _fitted(patient: Path, loaded: Any, reading: IntakeOptions) -> tuple[Any, An
     for sentence in intake.sentences:
         say(f"naisr: {sentence}")
     with bar("fitting") as progress:
-        return fitted_in_place(intake, loaded, known, progress=progress)
+        fitted, lies = fitted_in_place(intake, loaded, known, progress=progress)
+    if lies is not intake:
+        say(f"naisr: {lies.alignment}")
+    return fitted, lies
 
 
 def _tell_fit(fitted: Any, alternatives: Sequence[Mapping[str, Any]]) -> None:

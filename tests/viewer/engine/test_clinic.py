@@ -51,7 +51,7 @@ def test_elsewhere_only_what_lasts_of_a_patient_is_shown(egg_atlas, tmp_path, mo
     clinic, state = Clinic(engine), opened(ExplorerState(), engine.open(egg_atlas))
     reading = Reading(file)
     scan = clinic.read(egg_atlas, reading, KNOWN)
-    fit = clinic.fit(egg_atlas, scan, KNOWN)
+    fit, _ = clinic.fit(egg_atlas, scan, KNOWN)
     state = with_patient(state, OpenScan(1, file.name, reading, scan, KNOWN, fit))
     elsewhere = with_value(state, "age", 3.0)
     assert fit.lasting == 0.3
@@ -77,7 +77,7 @@ def test_two_patients_can_be_compared(desk, egg_atlas, tmp_path):
     egg(3.0, 1.0).export(other)
     reading = Reading(other)
     scan = clinic.read(egg_atlas, reading, ())
-    fit = clinic.fit(egg_atlas, scan, (("age", 3.0), ("sex", 1.0)))
+    fit, _ = clinic.fit(egg_atlas, scan, (("age", 3.0), ("sex", 1.0)))
     both = with_patient(state, OpenScan(2, other.name, reading, scan, (), fit))
     change = engine.surface(request_for(replace(both, compared=1), CHANGE, 128))
     assert change.volume_before_cm3 == pytest.approx(state.fit.volume_cm3)
@@ -113,7 +113,7 @@ def test_a_cloud_is_thinned_for_display_only(desk, egg_atlas, tmp_path):
     np.savetxt(path, trimesh.sample.sample_surface(egg(5.0, -1.0), 3 * SHOWN_POINTS, seed=0)[0])
     scan = clinic.read(egg_atlas, Reading(path), ())
     assert len(scan.faces) == 0 and 0 < len(scan.points_mm) <= SHOWN_POINTS
-    fit = clinic.fit(egg_atlas, scan, (("age", 5.0),))
+    fit, _ = clinic.fit(egg_atlas, scan, (("age", 5.0),))
     assert fit.residual_mm < 0.5
     clinic.forget(fit)
 
