@@ -188,6 +188,9 @@ def _fitted(patient: Path, loaded: Any, reading: IntakeOptions) -> tuple[Any, An
 def _tell_fit(fitted: Any, alternatives: Sequence[Mapping[str, Any]]) -> None:
     from naisr_model.covariates import interval_in_words
 
+    if not fitted.is_valid:
+        print("\n".join(fitted.remarks))
+        return
     covariates = fitted.individual.atlas.covariates
     for covariate in covariates:
         ends = fitted.intervals.get(covariate.name)

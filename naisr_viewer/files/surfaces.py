@@ -106,7 +106,8 @@ def description(
     reference: OpenScan | None = None,
 ) -> dict[str, Any]:
     """What a mesh file shows, as plain JSON."""
-    request, margin = result.request, result.volume_margin_cm3
+    request = result.request
+    margin = None if _is_missed(patient) else result.volume_margin_cm3
     given = dict(request.values)
     is_scan = result.origin is Origin.MEASURED
     return {
@@ -181,6 +182,11 @@ def _triangles(result: SurfaceResult) -> trimesh.Trimesh:
     return trimesh.Trimesh(
         points, result.faces, vertex_normals=result.normals, vertex_attributes=numbers, process=False
     )
+
+
+def _is_missed(patient: OpenScan | None) -> bool:
+    """Whether it is the shape of somebody whose fit is not valid: how sure it is, nobody knows."""
+    return patient is not None and patient.fit is not None and not patient.fit.is_valid
 
 
 def _patient_record(patient: OpenScan) -> dict[str, Any]:

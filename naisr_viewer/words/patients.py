@@ -78,8 +78,8 @@ def found_volume(fit: Fitted | None) -> str:
 
 
 def barred(name: str, fit: Fitted) -> str:
-    """Why a patient cannot be compared with; empty where it can."""
-    return "" if fit.is_valid else f"{name} was fitted, but its fit is {'; '.join(fit.remarks)}"
+    """Why a patient whose fit is not valid cannot be compared with."""
+    return f"{name} cannot be compared with; its fit is {'; '.join(fit.remarks)}"
 
 
 def sentence(text: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from PySide6.QtCore import QPointF, QSignalBlocker, Qt
 from PySide6.QtGui import QPainter, QPaintEvent, QPen, QStandardItemModel
@@ -112,7 +113,7 @@ class ChoiceBox(QComboBox):
         self,
         choices: Iterable[tuple[object, str]],
         current: object,
-        barred: Mapping[object, str] | None = None,
+        barred: Mapping[Any, str] | None = None,
     ) -> None:
         """Show data and text of what there is and what is chosen, without telling anybody.
 

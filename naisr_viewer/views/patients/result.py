@@ -46,10 +46,10 @@ class ComparePart(QWidget):
 
     def show_state(self, state: ExplorerState) -> None:
         """Offer the other fitted patients; one whose fit is not valid is named, but cannot be chosen."""
-        others = {each.key: each for each in state.patients if each.fit and each.key != state.patient}
-        names: dict[object, str] = {key: each.name for key, each in others.items()}
-        reasons: dict[object, str] = {
-            key: barred(each.name, each.fit) for key, each in others.items() if each.fit
-        }
-        current = state.compared if reasons.get(state.compared) == "" else None
-        self.box.show_choices([(None, "this patient as fitted"), *names.items()], current, reasons)
+        others = [
+            (each, each.fit) for each in state.patients if each.fit is not None and each.key != state.patient
+        ]
+        choices = [(None, "this patient as fitted"), *((each.key, each.name) for each, _ in others)]
+        reasons = {each.key: barred(each.name, fit) for each, fit in others if not fit.is_valid}
+        can_stay = state.compared in dict(choices) and state.compared not in reasons
+        self.box.show_choices(choices, state.compared if can_stay else None, reasons)
