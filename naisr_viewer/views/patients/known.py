@@ -12,7 +12,7 @@ from naisr_viewer.state.patients import Named, OpenScan
 from naisr_viewer.views.elided import ElidedCheckBox, unit_label
 from naisr_viewer.views.level_buttons import LevelButton, level_buttons
 from naisr_viewer.views.number_box import NumberBox
-from naisr_viewer.views.patients.pieces import button, exchange, grid_in, paragraph, section
+from naisr_viewer.views.patients.pieces import button, exchange, grid_in, paragraph, restyle, section
 from naisr_viewer.words.patients import sentence
 from naisr_viewer.words.titles import as_tip, label
 
@@ -167,6 +167,8 @@ class KnownPart(QWidget):
     def show_patient(self, patient: OpenScan) -> None:
         """Show whether ``patient`` can be fitted; what is typed stays."""
         self.align.setVisible(patient.scan.is_astray)
+        restyle(self.align, "primary" if patient.scan.is_astray else "")
+        restyle(self.fit, "" if patient.scan.is_astray else "primary")
         self.fit.setText("Fit again" if patient.fit else "Fit")
         self.fit.setEnabled(not patient.scan.blocked)
         self.fit.setToolTip(as_tip(sentence(patient.scan.blocked) or FIT_TIP))

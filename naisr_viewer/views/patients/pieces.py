@@ -45,6 +45,14 @@ def button(text: str, tip: str, style: str = "") -> QPushButton:
     return result
 
 
+def restyle(button: QPushButton, style: str) -> None:
+    """Give a button another style."""
+    if button.objectName() != style:
+        button.setObjectName(style)
+        button.style().unpolish(button)
+        button.style().polish(button)
+
+
 def section(part: QWidget, title: str, *beside: QWidget) -> QVBoxLayout:
     """The column of a part, beginning with its title and what stands ``beside`` it."""
     heading = QLabel(title)
