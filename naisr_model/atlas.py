@@ -36,6 +36,7 @@ from naisr_model.errors import InputError
 from naisr_model.frames import Frame
 from naisr_model.learning.fitting.belief import places_of
 from naisr_model.learning.fitting.evidence import ShapeFit
+from naisr_model.learning.fitting.placing import motion_of
 from naisr_model.learning.fitting.posterior import (
     POINTS,
     TWO_SIDED_95,
@@ -615,6 +616,29 @@ class Fit:
                     f"anything from {interval_in_words(covariate, low, high)} explains it"
                 )
         return tuple(sentences)
+
+    def motion_mm(
+        self, shape: trimesh.Trimesh | ArrayLike, *, progress: Progress = SILENT
+    ) -> NDArray[np.float64]:
+        """The rigid motion, 4x4 in millimetres, after which this or a better fit explains the patient best.
+
+        It is sought together with the code and the inferred covariates, see
+        :mod:`~naisr_model.learning.fitting.placing`.
+
+        Args:
+            shape: of the patient as it was fitted.
+            progress: checked between steps.
+
+        Raises:
+            Cancelled: when nobody waits for it any more.
+        """
+        individual, frame = self.individual, self.individual.atlas.frame
+        problem = individual.posterior.problem
+        sample = draw_sample(target_of(shape, frame), POINTS, CHECK_SAMPLE)
+        with threadpool_limits(1, user_api="blas"):
+            motion = motion_of(problem, sample, problem.pack(individual.vector, individual.latent), progress)
+        motion[:3, 3] = frame.to_mm(motion[:3, 3]) - motion[:3, :3] @ np.array(frame.centre_mm)
+        return motion
 
     @property
     def volume_cm3(self) -> float:

@@ -179,12 +179,18 @@ def _fitted(patient: Path, loaded: Any, reading: IntakeOptions) -> tuple[Any, An
     for sentence in intake.sentences:
         say(f"naisr: {sentence}")
     with bar("fitting") as progress:
-        return fitted_in_place(intake, loaded, known, progress=progress)
+        fitted, lies = fitted_in_place(intake, loaded, known, progress=progress)
+    if lies is not intake:
+        say(f"naisr: {lies.alignment}")
+    return fitted, lies
 
 
 def _tell_fit(fitted: Any, alternatives: Sequence[Mapping[str, Any]]) -> None:
     from naisr_model.covariates import interval_in_words
 
+    if not fitted.is_valid:
+        print("\n".join(fitted.remarks))
+        return
     covariates = fitted.individual.atlas.covariates
     for covariate in covariates:
         ends = fitted.intervals.get(covariate.name)

@@ -250,23 +250,6 @@ def propose(
     return Proposal(transform, before_mm, after_mm, _angle_deg(transform), rival_deg, landmarks_mm)
 
 
-def closest_motion(
-    mesh_mm: trimesh.Trimesh, reference_mm: trimesh.Trimesh, progress: Progress = SILENT
-) -> NDArray[np.float64]:
-    """The rigid 4x4 motion that lays a scan, which is about in place, onto a shape by trimmed closest points.
-
-    Args:
-        mesh_mm: the scan; a surface, whole or in part, or points without faces.
-        reference_mm: the shape; a surface.
-        progress: asked whether anybody waits.
-
-    Raises:
-        Cancelled: when nobody waits any more.
-    """
-    scan, reference = _scan_side(mesh_mm, REFERENCE_POINTS), _surface_side(reference_mm, REFERENCE_POINTS)
-    return _closest_points(scan, reference, np.eye(4), _overlapping, ICP_ITERATIONS, progress)
-
-
 def _landmark_residual_mm(
     alignment: Alignment, landmarks: Landmarks, transform: NDArray[np.float64]
 ) -> float:

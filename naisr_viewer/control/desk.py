@@ -170,13 +170,14 @@ class PatientDesk(QObject):
         self._watch()
         self._look_at_files()
 
-    def _show_fit(self, fitted: OpenScan, known: Named, fit: Fitted) -> None:
+    def _show_fit(self, fitted: OpenScan, known: Named, found: tuple[Fitted, Scan]) -> None:
         """A fit that came to its end, unless its patient was closed or read differently meanwhile."""
-        patient = self._controller.state.find(fitted.key)
+        (fit, scan), patient = found, self._controller.state.find(fitted.key)
         if patient is None or patient.scan is not fitted.scan:
             self._clinic.forget(fit)
             return
-        state = with_patient(self._controller.state, replace(patient, known=known, fit=fit))
+        placed = replace(patient, known=known, scan=scan, fit=fit)
+        state = with_patient(self._controller.state, placed)
         layout = Layout.FIT if patient.fit is None else state.layout
         self._controller.commit(replace(state, layout=layout))
 

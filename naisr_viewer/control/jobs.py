@@ -83,6 +83,6 @@ def reading(clinic: Clinic, atlas: Path, wanted: Reading, known: Named) -> Job[S
     )
 
 
-def fitting(clinic: Clinic, atlas: Path, scan: Scan, known: Named) -> Job[Fitted]:
-    """Fits an open atlas to a scan."""
+def fitting(clinic: Clinic, atlas: Path, scan: Scan, known: Named) -> Job[tuple[Fitted, Scan]]:
+    """Fits an open atlas to a scan; hands over what was found, and the scan as it lay for it."""
     return lambda deliver, progress: deliver(clinic.fit(atlas, scan, known, progress))

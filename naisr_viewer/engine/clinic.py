@@ -15,7 +15,7 @@ from naisr_viewer.engine.engine import Engine
 from naisr_viewer.engine.people import FittedPerson
 from naisr_viewer.state.layouts import FULL_SHAPE
 from naisr_viewer.state.patients import Fitted, Labels, Named, Reading, Scan
-from naisr_viewer.state.requests import EXACT_RESOLUTION, SurfaceRequest
+from naisr_viewer.state.requests import EXACT_RESOLUTION, SurfaceRequest, SurfaceResult
 
 if TYPE_CHECKING:
     from naisr_model.patients.intake import Intake
@@ -69,45 +69,60 @@ class Clinic:
         taken = intake.read(reading.path, model, reading.label, reading.scale)
         if reading.align != "none":
             taken = intake.aligned(taken, model, dict(known), reading.align, reading.landmarks, progress)
-        scan = _scan(taken)
-        self._intakes[scan] = taken
-        return scan
+        return self._scan(taken)
 
-    def fit(self, atlas: Path, scan: Scan, known: Named, progress: Progress = SILENT) -> Fitted:
+    def fit(self, atlas: Path, scan: Scan, known: Named, progress: Progress = SILENT) -> tuple[Fitted, Scan]:
         """Fit an open atlas to a patient that :meth:`read` has read; the engine then knows the person.
+
+        Returns:
+            What was found, and the scan as it lay for it: another one where it was laid onto its fit.
 
         Raises:
             InputError: when the shape cannot be fitted.
             Cancelled: when nobody waits any more.
         """
-        model, patient = self._engine.atlas(atlas), self._intakes[scan].patient
-        shape = patient.mesh_mm.vertices if patient.is_cloud else patient.mesh_mm
-        fit = model.fit(shape, dict(known), progress=progress.part(0.0, FIT_SHARE))
-        values = tuple(fit.covariates.items())
-        person = self._engine.admit(FittedPerson(atlas, fit, scan))
-        try:
-            surface = self._engine.surface(
-                SurfaceRequest(atlas, FULL_SHAPE, values, EXACT_RESOLUTION, person),
-                progress.part(FIT_SHARE, 1.0),
-            )
-        except BaseException:
-            self._engine.dismiss(person)
-            raise
-        return Fitted(
-            person=person,
-            values=values,
-            intervals=tuple((name, *ends) for name, ends in fit.intervals.items()),
-            volume_cm3=surface.volume_cm3,
-            volume_margin_cm3=surface.volume_margin_cm3,
-            residual_mm=fit.residual_mm,
-            lasting=fit.lasting if model.capabilities.transferable else None,
-            seconds=fit.seconds,
-            remarks=fit.remarks,
-        )
+        from naisr_model.patients.fitting import fitted_in_place
+
+        model, taken = self._engine.atlas(atlas), self._intakes[scan]
+        fit, lies = fitted_in_place(taken, model, dict(known), progress=progress.part(0.0, FIT_SHARE))
+        placed = scan if lies is taken else self._scan(lies)
+        person = FittedPerson(atlas, fit, placed)
+        return self._measured(person, progress.part(FIT_SHARE, 1.0)), placed
 
     def forget(self, fit: Fitted) -> None:
         """A fit that nobody asks for any more."""
         self._engine.dismiss(fit.person)
+
+    def _scan(self, taken: Intake) -> Scan:
+        scan = _scan(taken)
+        self._intakes[scan] = taken
+        return scan
+
+    def _measured(self, person: FittedPerson, progress: Progress) -> Fitted:
+        """What is told of a fit; the engine knows the person, unless nobody waits."""
+        values, number = tuple(person.fit.covariates.items()), self._engine.admit(person)
+        request = SurfaceRequest(person.atlas, FULL_SHAPE, values, EXACT_RESOLUTION, number)
+        try:
+            return _told(person, number, self._engine.surface(request, progress))
+        except BaseException:
+            self._engine.dismiss(number)
+            raise
+
+
+def _told(person: FittedPerson, number: int, surface: SurfaceResult) -> Fitted:
+    fit = person.fit
+    return Fitted(
+        person=number,
+        values=surface.request.values,
+        intervals=tuple((name, *ends) for name, ends in fit.intervals.items()),
+        volume_cm3=surface.volume_cm3,
+        volume_margin_cm3=surface.volume_margin_cm3,
+        residual_mm=fit.residual_mm,
+        lasting=fit.lasting if person.atlas_model.capabilities.transferable else None,
+        seconds=fit.seconds,
+        remarks=fit.remarks,
+        is_valid=fit.is_valid,
+    )
 
 
 def _is_clear(titles: Mapping[int | str, str]) -> bool:
@@ -138,6 +153,7 @@ def _scan(taken: Intake) -> Scan:
         notes=tuple(said["look"]),
         repairs=tuple(said["fine"]),
         blocked=" ".join(said["refuse"]),
+        is_astray=any(one.topic in ("astray", "far") for one in taken.found),
     )
 
 

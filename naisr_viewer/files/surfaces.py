@@ -106,7 +106,8 @@ def description(
     reference: OpenScan | None = None,
 ) -> dict[str, Any]:
     """What a mesh file shows, as plain JSON."""
-    request, margin = result.request, result.volume_margin_cm3
+    request = result.request
+    margin = None if _is_missed(patient) else result.volume_margin_cm3
     given = dict(request.values)
     is_scan = result.origin is Origin.MEASURED
     return {
@@ -183,6 +184,11 @@ def _triangles(result: SurfaceResult) -> trimesh.Trimesh:
     )
 
 
+def _is_missed(patient: OpenScan | None) -> bool:
+    """Whether it is the shape of somebody whose fit is not valid: how sure it is, nobody knows."""
+    return patient is not None and patient.fit is not None and not patient.fit.is_valid
+
+
 def _patient_record(patient: OpenScan) -> dict[str, Any]:
     """Who it is, and what of the covariates is known of them; the rest was inferred."""
     fit = patient.fit
@@ -190,6 +196,7 @@ def _patient_record(patient: OpenScan) -> dict[str, Any]:
         "scan": patient.reading.path.name,
         "known": dict(patient.known),
         "fitted": None if fit is None else dict(fit.values),
+        "is_valid": None if fit is None else fit.is_valid,
         "residual_mm": None if fit is None else round(fit.residual_mm, 4),
         "lasting": None if fit is None or fit.lasting is None else round(fit.lasting, 4),
     }

@@ -15,7 +15,7 @@ from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Layout, Panel
 from naisr_viewer.state.patients import Named
 from naisr_viewer.state.requests import Scale, SurfaceRequest, SurfaceResult
-from naisr_viewer.words.captions import DOUBTFUL, NO_SURFACE, UNSEEN, Caption
+from naisr_viewer.words.captions import DOUBTFUL, NO_SURFACE, NOT_VALID, UNSEEN, Caption, large
 
 Ask = Callable[[ExplorerState, Panel, int], SurfaceRequest]
 """What a panel shows in a state, at so many cells along a side of the box; there is an atlas."""
@@ -91,6 +91,8 @@ def caption_of(
 ) -> Callable[[ExplorerState, SurfaceResult], Caption]:
     """A caption that also says whether there is a surface, and whether to believe it.
 
+    Of somebody whose fit is not valid nothing is told that was measured.
+
     Args:
         measured: of a surface.
         doubtful: said where the deformation folds.
@@ -100,6 +102,8 @@ def caption_of(
         assert state.atlas is not None
         if len(result.faces) == 0:
             return NO_SURFACE
+        if result.request.person and not state.can_forecast:
+            return Caption(large(NOT_VALID.text), NOT_VALID.hint)
         if result.doubtful:
             return doubtful.beneath(measured(result))
         if state.atlas.population.has_data_at(dict(result.request.values)):

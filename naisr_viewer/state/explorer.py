@@ -57,7 +57,7 @@ class ExplorerState:
     def reference(self) -> Fitted | None:
         """The fit that is compared with."""
         other = self.find(self.compared)
-        return (other and other.fit) or self.fit
+        return other.fit if other and other.fit and other.fit.is_valid else self.fit
 
     @property
     def person(self) -> int:
@@ -70,6 +70,17 @@ class ExplorerState:
         if self.fit is not None:
             return tuple(value for _, value in self.fit.values)
         return self.atlas.centre if self.atlas else ()
+
+    @property
+    def can_forecast(self) -> bool:
+        """Whether the patient can be shown at other covariates: a fit that is not valid tells nothing."""
+        return self.fit is not None and self.fit.is_valid
+
+    def allows(self, layout: Layout) -> bool:
+        """Whether a layout has something to show of the patient that is shown."""
+        if layout.is_forecast:
+            return self.can_forecast
+        return self.fit is not None or not layout.needs_fit
 
     def find(self, key: int | None) -> OpenScan | None:
         """An open patient; None where there is none with this key."""
@@ -139,10 +150,15 @@ def without_patient(state: ExplorerState, key: int) -> ExplorerState:
 
 def showing(state: ExplorerState, key: int | None) -> ExplorerState:
     """Another patient, at what is known or found of them; None for the population average."""
-    state = replace(state, patient=key)
-    if state.fit is None and state.layout.needs_fit:
-        state = replace(state, layout=Layout.SIDE_BY_SIDE)
+    state = with_possible_layout(replace(state, patient=key))
     state = replace(state, values=state.home)
     for name, value in state.shown.known if state.shown and not state.fit else ():
         state = with_value(state, name, value)
     return state
+
+
+def with_possible_layout(state: ExplorerState) -> ExplorerState:
+    """``state`` in a layout that has something to show of the patient."""
+    if state.allows(state.layout):
+        return state
+    return replace(state, layout=Layout.SIDE_BY_SIDE if state.fit is None else Layout.FIT)

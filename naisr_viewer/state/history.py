@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from naisr_viewer.state.explorer import ExplorerState
-from naisr_viewer.state.layouts import Layout
+from naisr_viewer.state.explorer import ExplorerState, with_possible_layout
 
 UNDO_DEPTH = 50
 """How many acts are remembered; the fits that only they refer to stay in memory."""
@@ -71,15 +70,16 @@ def _work(state: ExplorerState) -> object:
 def _with_work(now: ExplorerState, wanted: ExplorerState, left: ExplorerState) -> ExplorerState:
     """``now`` with the work of ``wanted``, and in its layout unless another was chosen since ``left``."""
     layout = wanted.layout if now.layout is left.layout else now.layout
-    state = replace(
-        now,
-        values=wanted.values,
-        patients=wanted.patients,
-        patient=wanted.patient,
-        compared=wanted.compared,
-        layout=layout,
+    return with_possible_layout(
+        replace(
+            now,
+            values=wanted.values,
+            patients=wanted.patients,
+            patient=wanted.patient,
+            compared=wanted.compared,
+            layout=layout,
+        )
     )
-    return replace(state, layout=Layout.SIDE_BY_SIDE) if layout.needs_fit and not state.fit else state
 
 
 def _states(history: History, now: ExplorerState) -> Iterator[ExplorerState]:

@@ -19,6 +19,11 @@ class Layout(StrEnum):
         """Whether it is about a fitted patient."""
         return self in (Layout.FIT, Layout.CHANGE)
 
+    @property
+    def is_forecast(self) -> bool:
+        """Whether it shows the patient at other covariates, or against another one."""
+        return self is Layout.CHANGE
+
 
 @dataclass(frozen=True)
 class Panel:

@@ -64,6 +64,7 @@ class Scan:
         notes: what is odd and has to be looked at, a sentence each.
         repairs: what was set right or does no harm, a sentence each.
         blocked: what forbids a fit and what to do about it, a sentence; empty where nothing does.
+        is_astray: whether it lies elsewhere than the shapes of the atlas do, so that it is aligned first.
     """
 
     points_mm: NDArray[np.float32]
@@ -75,6 +76,7 @@ class Scan:
     notes: tuple[str, ...] = ()
     repairs: tuple[str, ...] = ()
     blocked: str = ""
+    is_astray: bool = False
 
 
 @dataclass(frozen=True)
@@ -91,7 +93,8 @@ class Fitted:
         lasting: share of what sets the person apart that is kept at other covariates; None where the shape
             model knows nobody at others.
         seconds: what the fit took.
-        remarks: what the shape does not settle, a sentence each.
+        remarks: what the shape does not settle, or that it was missed, a sentence each.
+        is_valid: whether the shape was met; where not, nothing else here means anything.
     """
 
     person: int
@@ -103,6 +106,7 @@ class Fitted:
     lasting: float | None
     seconds: float
     remarks: tuple[str, ...] = ()
+    is_valid: bool = True
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,6 +29,7 @@ class Fact(Enum):
     ATLAS = auto()  # an atlas is open
     REST = auto()  # nothing is being opened, fitted or exported
     FIT = auto()  # the patient that is shown has been fitted
+    FORECAST = auto()  # and so well that it can be shown at other covariates
     PAST = auto()  # an act can be undone
     FUTURE = auto()  # one that was undone can be redone
 
@@ -103,13 +104,19 @@ OPEN = frozenset({Fact.ATLAS})
 AT_REST = OPEN | {Fact.REST}
 
 
+def _needed(layout: Layout) -> set[Fact]:
+    if layout.is_forecast:
+        return {Fact.FORECAST}
+    return {Fact.FIT} if layout.needs_fit else set()
+
+
 def _layout(layout: Layout, number: int) -> Command:
     return Command(
         f"layout {layout}",
         layout.capitalize(),
         lambda window: window.layout_requested.emit(layout),
         keys=(f"Ctrl+{number}",),
-        needs=OPEN | {Fact.FIT} if layout.needs_fit else OPEN,
+        needs=OPEN | _needed(layout),
         offered=lambda atlas: layout in layouts_of(atlas),
         group="layout",
     )
@@ -319,6 +326,7 @@ def facts(state: ExplorerState, is_at_rest: bool, can_undo: bool, can_redo: bool
         Fact.ATLAS: state.atlas is not None,
         Fact.REST: is_at_rest,
         Fact.FIT: state.fit is not None,
+        Fact.FORECAST: state.can_forecast,
         Fact.PAST: can_undo,
         Fact.FUTURE: can_redo,
     }

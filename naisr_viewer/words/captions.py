@@ -34,6 +34,11 @@ UNSEEN = Caption(
     "Hardly anyone behind the atlas is near this combination of covariates (those not moved here are at "
     "their mean), so the shape is a guess.",
 )
+NOT_VALID = Caption(
+    "not valid",
+    "The fit missed the scan, so this is nobody's shape, and its volume says nothing of the patient: align "
+    "the scan to the atlas and fit it again, and check that it is such a shape.",
+)
 LATER = (
     "\nAway from the patient's own covariates another day is meant: what sets the patient apart is kept only "
     "as far as it is expected to last."

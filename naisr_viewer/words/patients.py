@@ -42,7 +42,12 @@ def measured(scan: Scan) -> str:
 
 
 def findings(fit: Fitted, covariates: Sequence[Covariate]) -> list[tuple[str, str, str]]:
-    """The rows of the result: what, its value with unit, and how sure or what it means."""
+    """The rows of the result: what, its value with unit, and how sure or what it means.
+
+    Of a fit that is not valid only how far it is off: its covariates and its volume are not the patient's.
+    """
+    if not fit.is_valid:
+        return [("Residual", length(fit.residual_mm), RESIDUAL), ("Time", duration(fit.seconds), "")]
     values = dict(fit.values)
     sure = {name: (low, high) for name, low, high in fit.intervals}
     rows = []
@@ -63,6 +68,18 @@ def findings(fit: Fitted, covariates: Sequence[Covariate]) -> list[tuple[str, st
         *lasting,
         ("Time", duration(fit.seconds), ""),
     ]
+
+
+def found_volume(fit: Fitted | None) -> str:
+    """What the list says of a patient."""
+    if fit is None:
+        return "not fitted"
+    return volume(fit.volume_cm3) if fit.is_valid else "not valid"
+
+
+def barred(name: str, fit: Fitted) -> str:
+    """Why a patient whose fit is not valid cannot be compared with."""
+    return f"{name} cannot be compared with; its fit is {'; '.join(fit.remarks)}"
 
 
 def sentence(text: str) -> str:

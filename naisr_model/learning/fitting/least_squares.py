@@ -111,12 +111,14 @@ class Quadratic:
 class Rows(NamedTuple):
     """Residuals ``[n]`` of a sample in model units and their derivatives by the parameters ``[n, P]``.
 
-    ``surface [n]`` is true for points on the surface.
+    ``surface [n]`` is true for points on the surface; ``by_place [n, dim]`` are the derivatives by where the
+    point itself lies.
     """
 
     residuals: Vector
     jacobian: Vector
     surface: NDArray[np.bool_]
+    by_place: Vector
 
     @property
     def noise(self) -> float:
@@ -137,21 +139,36 @@ def evaluate(problem: Problem, sample: Sample, parameters: Vector) -> Rows:
         residuals.double().numpy(force=True),
         np.hstack([by_all[:, problem.free], by_code]),
         (sample.distances == 0).numpy(force=True),
+        (local.normals * scale[:, None]).double().numpy(force=True),
     )
 
 
 def linearise(problem: Problem, rows: Rows, parameters: Vector, noise: float) -> Quadratic:
     """E and its derivatives at ``parameters [P]`` for residuals of standard deviation ``noise``."""
-    residuals, jacobian, _ = rows
-    squared = (residuals / (problem.tolerated * noise)) ** 2
-    share = problem.independent / (len(residuals) * noise**2)
-    weighted = jacobian.T * (share / (1 + squared) ** 2)
+    residuals, jacobian = rows.residuals, rows.jacobian
+    weighted = jacobian.T * weights_of(problem, residuals, noise)
     offset, precision = _prior_terms(problem, parameters)
     return Quadratic(
-        objective=float(share * (residuals**2 / (1 + squared)).sum() + offset @ precision @ offset),
+        objective=_misfit(problem, residuals, noise) + float(offset @ precision @ offset),
         gradient=weighted @ residuals + precision @ offset,
         hessian=weighted @ jacobian + precision,
     )
+
+
+def weights_of(problem: Problem, residuals: Vector, noise: float) -> Vector:
+    """Half of what dE adds for each residual, over that residual, ``[n]``."""
+    squared = (residuals / (problem.tolerated * noise)) ** 2
+    return _share(problem, residuals, noise) / (1 + squared) ** 2
+
+
+def _misfit(problem: Problem, residuals: Vector, noise: float) -> float:
+    """E without the prior."""
+    squared = (residuals / (problem.tolerated * noise)) ** 2
+    return float(_share(problem, residuals, noise) * (residuals**2 / (1 + squared)).sum())
+
+
+def _share(problem: Problem, residuals: Vector, noise: float) -> float:
+    return problem.independent / (len(residuals) * noise**2)
 
 
 def _prior_terms(problem: Problem, parameters: Vector) -> tuple[Vector, Vector]:

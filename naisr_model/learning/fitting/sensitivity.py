@@ -24,10 +24,12 @@ class Sensitivity(NamedTuple):
     Attributes:
         distances: Phi / |grad Phi|, ``[n]``.
         jacobian: by the covariates and then by the code, |grad Phi| held constant, ``[n, N + L]``.
+        normals: by the point's own place, grad Phi / |grad Phi|, ``[n, dim]``.
     """
 
     distances: Tensor
     jacobian: Tensor
+    normals: Tensor
 
 
 def sensitivity(model: ShapeModel, points: Tensor, covariates: Tensor, latent: Tensor) -> Sensitivity:
@@ -56,4 +58,5 @@ def _sensitivity(model: ShapeModel, points: Tensor, covariates: Tensor, latent: 
     slopes, by_covariates, by_latent = derivatives
     steepness = slopes.norm(dim=-1).clamp(min=LEAST_SLOPE)
     jacobian = torch.cat([by_covariates, by_latent], dim=-1) / steepness
-    return Sensitivity(values.detach()[:, 0] / steepness[:, 0], jacobian)
+    normals = slopes[:, 0] / steepness
+    return Sensitivity(values.detach()[:, 0] / steepness[:, 0], jacobian, normals)

@@ -87,7 +87,8 @@ class CovariatePanel(QFrame):
     def show_values(self, state: ExplorerState) -> None:
         """Put every row at its value, and say where home is: the patient's values or the population mean."""
         fit = state.fit
-        intervals = {name: (low, high) for name, low, high in fit.intervals} if fit is not None else {}
+        told = fit.intervals if fit is not None and fit.is_valid else ()
+        intervals = {name: (low, high) for name, low, high in told}
         for (name, value), home in zip(state.named, state.home, strict=True):
             self.rows[name].set_home(home, fit is not None, intervals.get(name))
             self.rows[name].set_value(value)

@@ -12,11 +12,12 @@ from naisr_viewer.state.patients import Named, OpenScan
 from naisr_viewer.views.elided import ElidedCheckBox, unit_label
 from naisr_viewer.views.level_buttons import LevelButton, level_buttons
 from naisr_viewer.views.number_box import NumberBox
-from naisr_viewer.views.patients.pieces import button, exchange, grid_in, paragraph, section
+from naisr_viewer.views.patients.pieces import button, exchange, grid_in, paragraph, restyle, section
 from naisr_viewer.words.patients import sentence
 from naisr_viewer.words.titles import as_tip, label
 
 FIT_TIP = "Find the shape of the atlas that comes closest to the scan"
+ALIGN_TIP = "The scan does not lie as the shapes of the atlas do: choose its Position before it is fitted"
 
 ADVICE = "Tick what is known; the rest is inferred from the scan."
 NOTHING_TO_KNOW = "The shapes of this atlas depend on no covariates; there is nothing to be known."
@@ -139,12 +140,13 @@ class KnownRow:
 
 
 class KnownPart(QWidget):
-    """The covariates that are known, and the button that fits."""
+    """The covariates that are known, the button that fits, and one that says to align first."""
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
         self.rows: dict[str, KnownRow] = {}
         self.fit = button("Fit", FIT_TIP, "primary")  # for the panel, which keeps it in sight
+        self.align = button("Align it first", ALIGN_TIP)
         self._table = QWidget()
         column = section(self, "Known covariates")
         self._advice = paragraph(ADVICE, "muted")
@@ -164,6 +166,9 @@ class KnownPart(QWidget):
 
     def show_patient(self, patient: OpenScan) -> None:
         """Show whether ``patient`` can be fitted; what is typed stays."""
+        self.align.setVisible(patient.scan.is_astray)
+        restyle(self.align, "primary" if patient.scan.is_astray else "")
+        restyle(self.fit, "" if patient.scan.is_astray else "primary")
         self.fit.setText("Fit again" if patient.fit else "Fit")
         self.fit.setEnabled(not patient.scan.blocked)
         self.fit.setToolTip(as_tip(sentence(patient.scan.blocked) or FIT_TIP))

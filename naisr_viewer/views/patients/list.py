@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
 
 from naisr_viewer.state.patients import OpenScan
 from naisr_viewer.views.elided import ElidedLabel
-from naisr_viewer.words.numbers import volume
+from naisr_viewer.words.patients import found_volume
 from naisr_viewer.words.titles import as_tip
 
 ROWS_IN_SIGHT = 4
@@ -61,9 +61,8 @@ class PatientList(QListWidget):
         self.clear()
         self._add(AVERAGE, "", "The atlas without anybody's own shape")
         for patient in self._patients:
-            found = volume(patient.fit.volume_cm3) if patient.fit else "not fitted"
             close = self._close_button(patient)
-            self._add(patient.name, found, str(patient.reading.path), patient.key, close)
+            self._add(patient.name, found_volume(patient.fit), str(patient.reading.path), patient.key, close)
         self.setFixedHeight(min(self.count(), ROWS_IN_SIGHT) * ROW_HEIGHT + LIST_BORDER)
 
     def _add(self, name: str, note: str, tip: str, key: int | None = None, *beside: QWidget) -> None:

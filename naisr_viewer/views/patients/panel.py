@@ -74,7 +74,7 @@ class PatientPanel(QFrame):
             part.setVisible(state.shown is not None)
         self.result.setVisible(state.fit is not None)
         can_compare = state.atlas is not None and Layout.CHANGE in layouts_of(state.atlas)
-        self.compare.setVisible(state.fit is not None and can_compare)
+        self.compare.setVisible(state.can_forecast and can_compare)
         self.scan.changed.setVisible(state.shown is not None and state.shown.is_changed)
         if state.shown is not None:
             self._show_patient(state.shown, old.shown)
@@ -88,7 +88,7 @@ class PatientPanel(QFrame):
         """What the Tab key goes through, as it is read."""
         top = [self.open, self.scan.reread_changed, self._area, self.list, self.scan.reread, self.scan.ghost]
         middle = [self.alignment.method, self.alignment.unit, *self.known.stops()]
-        return [*top, *middle, self.compare.box, self.known.fit]
+        return [*top, *middle, self.compare.box, self.known.align, self.known.fit]
 
     def set_editable(self, editable: bool) -> None:
         """Whether anything can be changed just now; it can be read and scrolled in any case."""
@@ -128,6 +128,12 @@ class PatientPanel(QFrame):
         """Scroll to what was just found, once it has its place."""
         self._area.ensureWidgetVisible(self.result, 0, 16)
 
+    def _point_at_position(self) -> None:
+        """Scroll to the choice of the alignment and open it."""
+        self._area.ensureWidgetVisible(self.alignment.method, 0, 16)
+        self.alignment.method.setFocus()
+        self.alignment.method.showPopup()
+
     def _show_rows(self, covariates: Sequence[Covariate]) -> None:
         """Made later than what stands below them, so that the Tab key has to be told."""
         self.known.show_covariates(covariates)
@@ -150,9 +156,10 @@ class PatientPanel(QFrame):
         warning = QVBoxLayout()
         warning.setContentsMargins(MARGIN_PX, 0, MARGIN_PX, 8)
         warning.addWidget(self.scan.changed)
-        foot = QVBoxLayout(self._foot)
+        foot = QHBoxLayout(self._foot)
         foot.setContentsMargins(MARGIN_PX, 8, MARGIN_PX, 10)
-        foot.addWidget(self.known.fit)
+        foot.addWidget(self.known.align)
+        foot.addWidget(self.known.fit, 1)
         outer = QVBoxLayout(self)
         outer.setContentsMargins(1, 0, 0, 0)
         outer.setSpacing(0)
@@ -178,6 +185,7 @@ class PatientPanel(QFrame):
             reread.clicked.connect(self.reread_requested)
         self.scan.ghost.clicked.connect(self.ghost_toggled)
         self.alignment.reading_changed.connect(self.reading_changed)
+        self.known.align.clicked.connect(self._point_at_position)
         self.known.fit.clicked.connect(lambda: self.fit_requested.emit(self.known.given()))
         self.compare.box.activated.connect(lambda: self.compared_chosen.emit(self.compare.box.currentData()))
         for box in (self.alignment.method, self.alignment.unit, self.compare.box):

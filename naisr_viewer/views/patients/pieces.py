@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from PySide6.QtCore import QPointF, QSignalBlocker, Qt
-from PySide6.QtGui import QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QPainter, QPaintEvent, QPen, QStandardItemModel
 from PySide6.QtWidgets import (
     QComboBox,
     QGridLayout,
@@ -42,6 +43,14 @@ def button(text: str, tip: str, style: str = "") -> QPushButton:
     result.setToolTip(tip)
     result.setObjectName(style)
     return result
+
+
+def restyle(button: QPushButton, style: str) -> None:
+    """Give a button another style."""
+    if button.objectName() != style:
+        button.setObjectName(style)
+        button.style().unpolish(button)
+        button.style().polish(button)
 
 
 def section(part: QWidget, title: str, *beside: QWidget) -> QVBoxLayout:
@@ -108,17 +117,36 @@ class ChoiceBox(QComboBox):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setItemDelegate(QStyledItemDelegate(self))  # the usual one hardly marks the entry
 
-    def show_choices(self, choices: Iterable[tuple[object, str]], current: object) -> None:
-        """Show data and text of what there is and what is chosen, without telling anybody."""
+    def show_choices(
+        self,
+        choices: Iterable[tuple[object, str]],
+        current: object,
+        barred: Mapping[Any, str] | None = None,
+    ) -> None:
+        """Show data and text of what there is and what is chosen, without telling anybody.
+
+        Args:
+            choices: data and text of each.
+            current: data of the one that is chosen.
+            barred: data of those that cannot be chosen, and why.
+        """
         wanted = list(choices)
         with QSignalBlocker(self):
             if wanted != [(self.itemData(i), self.itemText(i)) for i in range(self.count())]:
                 self.clear()
-                for index, (data, text) in enumerate(wanted):
+                for data, text in wanted:
                     self.addItem(text, data)
-                    self.setItemData(index, as_tip(text), Qt.ItemDataRole.ToolTipRole)
+            for index, (data, text) in enumerate(wanted):
+                self._bar(index, text, (barred or {}).get(data, ""))
             self.setCurrentIndex([data for data, _ in wanted].index(current))
         self.setToolTip(as_tip(f"{self._tip}:\n{self.currentText()}"))
+
+    def _bar(self, index: int, text: str, reason: str) -> None:
+        """Let an entry be chosen unless there is a reason against it, which is told on hover."""
+        model = self.model()
+        assert isinstance(model, QStandardItemModel)
+        model.item(index).setEnabled(not reason)
+        self.setItemData(index, as_tip(sentence(reason) or text), Qt.ItemDataRole.ToolTipRole)
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """The style sheet takes the arrow away with the frame; draw another."""

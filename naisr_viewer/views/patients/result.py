@@ -11,15 +11,17 @@ from naisr_model.covariates import Covariate
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.patients import Fitted
 from naisr_viewer.views.patients.pieces import ChoiceBox, grid_in, paragraph, section, warnings
-from naisr_viewer.words.patients import LONGEST_IN_TABLE, breakable, findings
+from naisr_viewer.words.patients import LONGEST_IN_TABLE, barred, breakable, findings, sentence
 
 
 def result_part(fit: Fitted, covariates: Sequence[Covariate]) -> QWidget:
     """What ``fit`` found, and how sure it is."""
     part, table = QWidget(), QWidget()
     column = section(part, "Result")
+    if not fit.is_valid:
+        column.addWidget(paragraph("\n".join(map(sentence, fit.remarks)), "blocked"))
     column.addWidget(table)
-    if fit.remarks:
+    if fit.is_valid and fit.remarks:
         column.addWidget(warnings(fit.remarks))
     grid = grid_in(table, 12, 0, wide=1)
     top, right = Qt.AlignmentFlag.AlignTop, Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignRight
@@ -43,7 +45,11 @@ class ComparePart(QWidget):
         section(self, "Compare with").addWidget(self.box)
 
     def show_state(self, state: ExplorerState) -> None:
-        """Offer the other fitted patients."""
-        others = {each.key: each.name for each in state.patients if each.fit and each.key != state.patient}
-        current = state.compared if state.compared in others else None
-        self.box.show_choices([(None, "this patient as fitted"), *others.items()], current)
+        """Offer the other fitted patients; one whose fit is not valid is named, but cannot be chosen."""
+        others = [
+            (each, each.fit) for each in state.patients if each.fit is not None and each.key != state.patient
+        ]
+        choices = [(None, "this patient as fitted"), *((each.key, each.name) for each, _ in others)]
+        reasons = {each.key: barred(each.name, fit) for each, fit in others if not fit.is_valid}
+        can_stay = state.compared in dict(choices) and state.compared not in reasons
+        self.box.show_choices(choices, state.compared if can_stay else None, reasons)

@@ -12,7 +12,7 @@ from naisr_model.atlas import Atlas
 from naisr_model.checkpoint import load
 from naisr_model.data.align import Alignment
 from naisr_model.errors import Cancelled, InputError
-from naisr_model.patients.intake import aligned, labels, read, take_in
+from naisr_model.patients.intake import Intake, aligned, labels, read, take_in
 from naisr_model.progress import Progress
 
 TRUE_CM3 = egg(6.0, 1.0).volume / 1000
@@ -73,6 +73,24 @@ def test_landmarks_follow_the_repairs(egg_atlas, tmp_path):
     assert [remark.severity for remark in intake.remarks] == [
         "fine"
     ] and "landmarks 0.00 mm apart" in intake.sentences[2]
+
+
+def test_landmarks_of_another_scan_that_make_it_worse_are_told_of(egg_atlas, tmp_path):
+    ends = {"top": (0.0, 0.0, 32.0), "side": (22.0, 0.0, 0.0), "front": (0.0, 20.0, 0.0)}
+    atlas = Atlas(dataclasses.replace(load(egg_atlas), alignment=Alignment("landmarks", "", ends)))
+    path, landmarks = saved(egg(6.0, 1.0), tmp_path / "egg.stl", turned(0, [0, 0, 8])), tmp_path / "marks.csv"
+
+    def given(motion) -> Intake:
+        rows = [(name, *(motion @ [*point, 1])[:3]) for name, point in ends.items()]
+        landmarks.write_text("name,x,y,z\n" + "".join(f"{n},{x},{y},{z}\n" for n, x, y, z in rows))
+        return take_in(path, atlas, {"age": 6.0}, align="landmarks", landmarks=landmarks)
+
+    assert "worse" not in [remark.topic for remark in given(turned(0, [0, 0, 8])).remarks]
+    other = given(turned(50, [0, 0, -20]))
+    (worse,) = [remark for remark in other.remarks if remark.topic == "worse"]
+    assert worse.severity == "look" and "are of this scan" in worse.remedy and other.proposal is not None
+    ends_mm = f"{other.proposal.before_mm:.1f} mm before, {other.proposal.after_mm:.1f} mm after"
+    assert worse.sentence == f"the alignment made it worse: {ends_mm}"
 
 
 def test_an_alignment_tells_how_far_it_is_and_can_be_stopped(egg_atlas, tmp_path):

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 import trimesh
-from eggs import egg
+from eggs import egg, turned
 from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QTimer, QUrl
 from PySide6.QtGui import QAction, QDropEvent
 from PySide6.QtTest import QTest
@@ -273,6 +273,69 @@ def test_a_scan_far_away_is_shown_blocked_until_it_is_aligned(ready, qtbot, tmp_
     assert "icp" in scan.alignment and window.patients.known.fit.isEnabled()
     assert np.abs(scan.points_mm.mean(axis=0)).max() < 5
     assert dict(window.patients.known.given()) == {"age": 6.0}  # what was typed stays
+
+
+def test_a_scan_astray_is_aligned_first_or_its_fit_is_told_not_valid(ready, qtbot, tmp_path):
+    window, controller = ready
+    path = tmp_path / "astray.stl"
+    egg(6.0, 1.0).apply_transform(turned(0, [12.0, 0, 0])).export(path)
+    drop(window, path)
+    settle(qtbot, controller)
+    panel = window.patients
+    assert panel.known.align.isVisible() and panel.known.fit.isEnabled()
+    click(panel.known.fit)  # against the advice
+    settle(qtbot, controller)
+    before = controller.state
+    assert not before.fit.is_valid and before.layout is Layout.FIT
+    assert not action(window, "Before and after").isEnabled() and action(window, "Fit").isChecked()
+    assert not panel.compare.isVisible()
+    for view in (FULL_SHAPE, UNCERTAINTY):
+        assert "not valid" in window.shapes.caption(view) and "±" not in window.shapes.caption(view)
+    click(panel.known.align)
+    QTest.keyClick(panel.alignment.method.view(), Qt.Key.Key_Down)  # rigid
+    QTest.keyClick(panel.alignment.method.view(), Qt.Key.Key_Return)
+    settle(qtbot, controller)
+    lay = controller.state.shown.scan
+    assert not panel.known.align.isVisible()
+    click(panel.known.fit)
+    settle(qtbot, controller)
+    state = controller.state
+    assert state.fit.is_valid and action(window, "Before and after").isEnabled()
+    assert state.shown.scan is not lay and "onto its own fit" in panel.alignment.sentence.text()
+    assert np.abs(state.shown.scan.points_mm.mean(axis=0)).max() < 1.0
+    assert state.fit.volume_cm3 == pytest.approx(CUBIC_CM, rel=0.03)
+    undo(window, qtbot, controller)
+    assert controller.state.shown.scan is lay and controller.state.fit is None
+    undo(window, qtbot, controller)
+    assert controller.state == before
+
+
+def test_nobody_is_compared_with_whose_fit_missed(fitted, qtbot, tmp_path):
+    window, controller = fitted
+    good = controller.state
+    trimesh.creation.icosphere(3, 12.0).export(tmp_path / "ball.stl")
+    drop(window, tmp_path / "ball.stl")
+    settle(qtbot, controller)
+    controller.set_layout(Layout.FULL_SHAPE)
+    click(window.patients.known.fit)
+    settle(qtbot, controller)
+    ball = controller.state
+    assert not ball.fit.is_valid
+    controller.export(ExportChoice((FULL_SHAPE,), "stl", 64, tmp_path / "out"))
+    settle(qtbot, controller)
+    (record,) = (json.loads(path.read_text()) for path in (tmp_path / "out").glob("*.json"))
+    assert record["patient"]["is_valid"] is False and record["volume_95_percent_margin_cm3"] is None
+    window.patients.patient_chosen.emit(good.patient)
+    settle(qtbot, controller)
+    box = window.patients.compare.box
+    assert [box.itemText(i) for i in range(box.count())] == ["this patient as fitted", "ball.stl"]
+    box.setFocus()
+    QTest.keyClick(box, Qt.Key.Key_Down)
+    assert box.currentData() is None and controller.state.compared is None
+    controller.set_layout(Layout.CHANGE)
+    window.patients.patient_chosen.emit(ball.patient)
+    settle(qtbot, controller)
+    assert controller.state.layout is Layout.FIT
 
 
 def test_a_label_is_chosen(ready, qtbot, tmp_path, monkeypatch):

@@ -32,6 +32,6 @@ def desk(egg_atlas: Path, file: Path, tmp_path_factory: pytest.TempPathFactory):
     reading = Reading(file)
     scan = clinic.read(egg_atlas, reading, KNOWN)
     told: list[float] = []
-    fit = clinic.fit(egg_atlas, scan, KNOWN, Progress(told.append))
+    fit, _ = clinic.fit(egg_atlas, scan, KNOWN, Progress(told.append))
     assert told == sorted(told) and told[-1] == pytest.approx(1)
     return engine, clinic, with_patient(state, OpenScan(1, file.name, reading, scan, KNOWN, fit))

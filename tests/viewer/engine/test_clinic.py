@@ -51,7 +51,7 @@ def test_elsewhere_only_what_lasts_of_a_patient_is_shown(egg_atlas, tmp_path, mo
     clinic, state = Clinic(engine), opened(ExplorerState(), engine.open(egg_atlas))
     reading = Reading(file)
     scan = clinic.read(egg_atlas, reading, KNOWN)
-    fit = clinic.fit(egg_atlas, scan, KNOWN)
+    fit, _ = clinic.fit(egg_atlas, scan, KNOWN)
     state = with_patient(state, OpenScan(1, file.name, reading, scan, KNOWN, fit))
     elsewhere = with_value(state, "age", 3.0)
     assert fit.lasting == 0.3
@@ -77,7 +77,7 @@ def test_two_patients_can_be_compared(desk, egg_atlas, tmp_path):
     egg(3.0, 1.0).export(other)
     reading = Reading(other)
     scan = clinic.read(egg_atlas, reading, ())
-    fit = clinic.fit(egg_atlas, scan, (("age", 3.0), ("sex", 1.0)))
+    fit, _ = clinic.fit(egg_atlas, scan, (("age", 3.0), ("sex", 1.0)))
     both = with_patient(state, OpenScan(2, other.name, reading, scan, (), fit))
     change = engine.surface(request_for(replace(both, compared=1), CHANGE, 128))
     assert change.volume_before_cm3 == pytest.approx(state.fit.volume_cm3)
@@ -107,13 +107,43 @@ def test_a_far_scan_is_shown_blocked_and_can_be_aligned(desk, egg_atlas, tmp_pat
     assert np.abs(aligned.points_mm.mean(axis=0)).max() < 5
 
 
+def test_a_patient_is_shown_where_its_fit_laid_it(desk, egg_atlas, tmp_path):
+    engine, clinic, state = desk
+    path = tmp_path / "s27.stl"
+    egg(8.0, -1.0).apply_translation([0, 0, 60]).export(path)
+    reading = Reading(path, align="icp")
+    scan = clinic.read(egg_atlas, reading, ())  # onto the average, which is smaller
+    fit, placed = clinic.fit(egg_atlas, scan, ())
+    off_mm, placed_off_mm = (np.abs(each.points_mm.mean(axis=0)).max() for each in (scan, placed))
+    assert placed is not scan and placed_off_mm < max(0.3, off_mm)
+    assert "onto its own fit" in placed.alignment and "onto its own fit" not in scan.alignment
+    shown = with_patient(state, OpenScan(2, path.name, reading, placed, (), fit))
+    colouring = engine.surface(request_for(shown, SCAN, 128)).colouring
+    assert np.abs(colouring.values).mean() == pytest.approx(fit.residual_mm, rel=0.5)
+    clinic.forget(fit)
+    again, stays = clinic.fit(egg_atlas, placed, ())  # from where it lies now
+    assert again.residual_mm < 1.1 * fit.residual_mm
+    assert np.abs(stays.points_mm - placed.points_mm).max() < 1.0
+    clinic.forget(again)
+
+
+def test_what_is_no_such_shape_is_not_valid(desk, egg_atlas, tmp_path):
+    _, clinic, _ = desk
+    path = tmp_path / "ball.stl"
+    trimesh.creation.icosphere(3, 12.0).export(path)
+    scan = clinic.read(egg_atlas, Reading(path), ())
+    fit, _ = clinic.fit(egg_atlas, scan, ())
+    assert not fit.is_valid and fit.remarks[0].startswith("not valid")
+    clinic.forget(fit)
+
+
 def test_a_cloud_is_thinned_for_display_only(desk, egg_atlas, tmp_path):
     _, clinic, _ = desk
     path = tmp_path / "cloud.xyz"
     np.savetxt(path, trimesh.sample.sample_surface(egg(5.0, -1.0), 3 * SHOWN_POINTS, seed=0)[0])
     scan = clinic.read(egg_atlas, Reading(path), ())
     assert len(scan.faces) == 0 and 0 < len(scan.points_mm) <= SHOWN_POINTS
-    fit = clinic.fit(egg_atlas, scan, (("age", 5.0),))
+    fit, _ = clinic.fit(egg_atlas, scan, (("age", 5.0),))
     assert fit.residual_mm < 0.5
     clinic.forget(fit)
 

@@ -49,7 +49,7 @@ def test_uncertainty_is_positive_and_grows_with_what_is_not_known(desk, egg_atla
     engine, clinic, state = desk
     told = engine.surface(request_for(state, UNCERTAINTY, 128))
     assert told.colouring.scale == "unsigned" and (told.colouring.values > 0).all()
-    fit = clinic.fit(egg_atlas, state.shown.scan, ())
+    fit, _ = clinic.fit(egg_atlas, state.shown.scan, ())
     assert {name for name, _, _ in fit.intervals} == {"age", "sex"}
     untold = with_patient(state, replace(state.shown, known=(), fit=fit))
     unsure = engine.surface(request_for(untold, UNCERTAINTY, 128))
@@ -67,7 +67,7 @@ def test_the_deviation_from_the_average_is_what_sets_a_patient_apart(egg_atlas, 
     engine = Engine(folder=tmp_path / "cache")
     clinic, state = Clinic(engine), opened(ExplorerState(), engine.open(egg_atlas))
     scan = clinic.read(egg_atlas, Reading(file), KNOWN)
-    fit = clinic.fit(egg_atlas, scan, KNOWN)
+    fit, _ = clinic.fit(egg_atlas, scan, KNOWN)
     state = with_patient(state, OpenScan(1, file.name, Reading(file), scan, KNOWN, fit))
     told = engine.surface(request_for(state, DEVIATION, 128))
     average = engine.surface(replace(request_for(state, FULL_SHAPE, 128), person=0))

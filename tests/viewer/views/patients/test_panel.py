@@ -426,6 +426,56 @@ def test_the_result_tells_values_and_how_sure_they_are(panel, start):
     assert "does not tell" not in words(panel.result)
 
 
+MISSED = replace(
+    FIT,
+    is_valid=False,
+    residual_mm=9.51,
+    remarks=("not valid: the fitted surface is 9.5 mm from the scan; align",),
+)
+
+
+def test_a_fit_that_missed_tells_neither_covariates_nor_volume(panel, start):
+    panel.show_state(with_patient(start, replace(ONE, fit=MISSED)))
+    said = words(panel.result)
+    assert "Not valid: the fitted surface is 9.5 mm from the scan; align" in said and "9.51 mm" in said
+    for word in ("cm³", "kg", "months", "inferred", "Lasting"):
+        assert word not in said
+    assert "not valid" in words(panel.list).split("\n") and "48.3" not in words(panel.list)
+    assert not panel.compare.isVisible()
+
+
+def test_a_scan_astray_is_pointed_to_its_position(panel, start, heard):
+    panel.show_state(with_patient(start, ONE))
+    assert not panel.known.align.isVisible()
+    panel.resize(pp.PANEL_WIDTH, 360)
+    panel.show_state(with_patient(start, replace(ONE, scan=scan(is_astray=True))))
+    assert panel.known.align.text() == "Align it first" and panel.known.fit.isEnabled()
+    assert panel.known.align.geometry().right() < panel.known.fit.geometry().left()
+    click(panel.known.align)
+    box = panel.alignment.method
+    assert panel.rect().contains(box.mapTo(panel, box.rect().center()))
+    QTest.keyClick(box.view(), Qt.Key.Key_Down)
+    QTest.keyClick(box.view(), Qt.Key.Key_Return)
+    assert heard == [("reading_changed", replace(ONE.reading, align="icp"))]
+
+
+def test_one_whose_fit_missed_cannot_be_compared_with(panel, start, heard):
+    others = with_patient(
+        with_patient(start, replace(TWO, fit=MISSED)), replace(ONE, key=3, name="p03", fit=FIT)
+    )
+    state = replace(with_patient(others, replace(ONE, fit=FIT)), compared=2)
+    panel.show_state(state)
+    box = panel.compare.box
+    assert box.currentData() is None and state.reference == FIT
+    hint = box.itemData(box.findText("p02.ply"), Qt.ItemDataRole.ToolTipRole)
+    assert "cannot be compared with" in hint and "not valid" in hint
+    box.setFocus()
+    QTest.keyClick(box, Qt.Key.Key_Space)
+    QTest.keyClick(box.view(), Qt.Key.Key_Down)  # over the one that is barred
+    QTest.keyClick(box.view(), Qt.Key.Key_Return)
+    assert heard == [("compared_chosen", 3)]
+
+
 def test_a_new_result_is_scrolled_to(panel, start, qtbot):
     panel.resize(pp.PANEL_WIDTH, 500)
     panel.show_state(with_patient(start, ONE))

@@ -1,0 +1,115 @@
+"""Where a patient lies: its rigid motion sought together with the code and the unknown covariates.
+
+A point x that is turned by a small a about m and shifted by t comes to lie a x (x - m) + t farther, and its
+distance to the shape grows by
+
+    dr = n . (a x (x - m) + t) = a . ((x - m) x n) + t . n,   n = grad Phi / |grad Phi|.
+
+These six columns stand beside those of the parameters in every Gauss-Newton step. The motion has no prior:
+what the shape model finds improbable of a person is rather explained by where the person lies.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from naisr_model.learning.fitting.least_squares import (
+    EASED,
+    FIRST_DAMPING,
+    STIFFENED,
+    Problem,
+    Rows,
+    evaluate,
+    linearise,
+    weights_of,
+)
+from naisr_model.learning.fitting.target import Sample
+from naisr_model.progress import SILENT, Progress
+
+Vector = NDArray[np.float64]
+
+STEPS, STIFFEST = 40, 1e6
+"""At most so many steps are tried, and up to this damping."""
+
+SETTLED = 1e-4
+"""Model units: a step that moves no point farther is the last one."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """Somewhere on the way.
+
+    Attributes:
+        motion: made so far, 4x4.
+        parameters: see :class:`~naisr_model.learning.fitting.least_squares.Problem`, ``[P]``.
+        points: of the sample, moved, ``[n, 3]``.
+        rows: the residuals there.
+    """
+
+    motion: Vector
+    parameters: Vector
+    points: Vector
+    rows: Rows
+
+
+def motion_of(problem: Problem, sample: Sample, parameters: Vector, progress: Progress = SILENT) -> Vector:
+    """The rigid 4x4 motion, model units, after which a patient is explained best.
+
+    Args:
+        problem: which covariates are free besides the code.
+        sample: of the patient as it lies.
+        parameters: of its fit there, ``[P]``.
+        progress: checked before every step.
+
+    Raises:
+        Cancelled: when nobody waits for it any more.
+    """
+    here, damping = _place(problem, sample, np.eye(4), parameters), FIRST_DAMPING
+    for _ in range(STEPS):
+        progress.check()
+        there = _stepped(problem, sample, here, damping)
+        noise = here.rows.noise
+        before, after = (
+            linearise(problem, place.rows, place.parameters, noise).objective for place in (here, there)
+        )
+        if after < before:
+            moved = np.linalg.norm(there.points - here.points, axis=1).max()
+            here, damping = there, damping * EASED
+            if moved < SETTLED:
+                break
+        elif (damping := damping * STIFFENED) > STIFFEST:
+            break
+    return here.motion
+
+
+def _place(problem: Problem, sample: Sample, motion: Vector, parameters: Vector) -> _Place:
+    points = sample.points.double().numpy() @ motion[:3, :3].T + motion[:3, 3]
+    lies = Sample(torch.as_tensor(points).to(sample.points), sample.distances)
+    return _Place(motion, parameters, points, evaluate(problem, lies, parameters))
+
+
+def _stepped(problem: Problem, sample: Sample, here: _Place, damping: float) -> _Place:
+    """A damped step of motion and parameters together."""
+    rows, middle = here.rows, here.points.mean(axis=0)
+    near = linearise(problem, rows, here.parameters, rows.noise)
+    by_motion = np.hstack([np.cross(here.points - middle, rows.by_place), rows.by_place])
+    weighted = by_motion.T * weights_of(problem, rows.residuals, rows.noise)
+    across = weighted @ rows.jacobian
+    hessian = np.block([[weighted @ by_motion, across], [across.T, near.hessian]])
+    gradient = np.concatenate([weighted @ rows.residuals, near.gradient])
+    step = -np.linalg.solve(hessian + damping * np.diag(np.diag(hessian)), gradient)
+    motion = _rigid(step[:3], step[3:6], middle) @ here.motion
+    return _place(problem, sample, motion, problem.bounded(here.parameters + step[6:]))
+
+
+def _rigid(turn: Vector, shift: Vector, middle: Vector) -> Vector:
+    """A turn (rotation vector) about ``middle``, then a shift, as a 4x4 matrix."""
+    motion = np.eye(4)
+    motion[:3, :3] = Rotation.from_rotvec(turn).as_matrix()
+    motion[:3, 3] = middle + shift - motion[:3, :3] @ middle
+    return motion
