@@ -59,11 +59,11 @@ def test_an_unknown_model_is_named(egg_atlas, tmp_path):
 
 
 def test_a_missing_file_is_named(tmp_path):
-    with pytest.raises(InputError, match=r"no file .*nowhere.*give the path of an atlas"):
+    with pytest.raises(InputError, match=r"nowhere.* does not exist; give the path of an atlas"):
         load(tmp_path / "nowhere.safetensors")
 
 
-@pytest.mark.parametrize("kept", [0, 5, 200, -100])
+@pytest.mark.parametrize("kept", [5, 200, -100])
 def test_a_truncated_file_is_refused(egg_atlas, tmp_path, kept):
     path = tmp_path / "short.safetensors"
     path.write_bytes(egg_atlas.read_bytes()[:kept])
