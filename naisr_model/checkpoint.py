@@ -27,7 +27,7 @@ from naisr_model.covariates import Population
 from naisr_model.data import formats
 from naisr_model.data.align import Alignment
 from naisr_model.errors import InputError
-from naisr_model.files import replacing, require_file
+from naisr_model.files import replacing, require_file, why_unreadable
 from naisr_model.frames import Frame
 from naisr_model.models.base import ShapeModel
 from naisr_model.models.factory import MODELS, build, layout, model_of, read_preset
@@ -155,7 +155,7 @@ def load(path: str | Path) -> Checkpoint:
     except SafetensorError as error:
         raise InputError(f"{path} {_foreign(path)}") from error
     except OSError as error:
-        raise InputError(f"{path} cannot be read ({error.strerror or error}); make it readable") from error
+        raise InputError(why_unreadable(path, error)) from error
     with _consistent(path):
         checkpoint = _assemble(record, preset, population, tensors)
         checkpoint.require_sound()

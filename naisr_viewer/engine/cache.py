@@ -25,7 +25,7 @@ from naisr_model import errors
 from naisr_model.capabilities import Capabilities
 from naisr_model.covariates import Population
 from naisr_model.errors import InputError
-from naisr_model.files import replacing, sources_digest
+from naisr_model.files import replacing, sources_digest, why_unreadable
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.layouts import FULL_SHAPE, TEMPLATE
 from naisr_viewer.state.requests import EXACT_RESOLUTION, Origin, SurfaceRequest, SurfaceResult
@@ -59,7 +59,7 @@ def fingerprint_of(path: Path) -> str:
         with path.open("rb") as file:  # piece by piece: anything may have been opened, however large
             contents = hashlib.file_digest(file, "sha256").digest()
     except OSError as error:
-        raise InputError(f"cannot read {path}: {error.strerror}; give the path of an atlas") from error
+        raise InputError(why_unreadable(path, error, "an atlas")) from error
     return hashlib.sha256(program_digest() + contents).hexdigest()[:32]
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from naisr_model.data.remarks import Remark
 from naisr_model.errors import InputError
+from naisr_model.files import why_unreadable
 
 MOST_BYTES = 1 << 30
 """Of voxels as the file stores them; as whole numbers and as a surface they take a few times as much."""
@@ -61,7 +62,7 @@ def beginning(path: Path, count: int) -> bytes:
         with path.open("rb") as file:
             start = file.read(_BLOCK)
     except OSError as error:
-        raise InputError(f"{path.name} cannot be read ({error.strerror}); check the file") from error
+        raise InputError(why_unreadable(path, error)) from error
     if not start.startswith(_GZIP):
         return start[:count]
     try:
@@ -83,7 +84,7 @@ def content(path: Path) -> bytes:
             most = MOST_BYTES + _HEADROOM
             return unpacked(path.name, file, "gzip", most) if packed else file.read(most)
     except OSError as error:
-        raise InputError(f"{path.name} cannot be read ({error.strerror}); check the file") from error
+        raise InputError(why_unreadable(path, error)) from error
 
 
 def unpacked(name: str, file: BinaryIO, encoding: str, most: int) -> bytes:

@@ -26,6 +26,7 @@ from naisr_model.data.images.base import (
 )
 from naisr_model.data.remarks import Remark
 from naisr_model.errors import InputError
+from naisr_model.files import why_unreadable
 
 SIGNS_TO_LPS = {
     "left-posterior-superior": (1, 1, 1),
@@ -351,4 +352,4 @@ def _apart(path: Path, header: Mapping[str, Any], data: bytes) -> tuple[str, byt
         with apart.open("rb") as file:
             return apart.name, file.read(MOST_BYTES + MOST_NUMBERS)
     except OSError as error:
-        raise InputError(f"{apart.name} cannot be read ({error.strerror}); check the file") from error
+        raise InputError(why_unreadable(apart, error)) from error
