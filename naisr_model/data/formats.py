@@ -42,14 +42,13 @@ def content_of(path: str | Path) -> bytes:
 MESHES = {"stl": "STL", "ply": "PLY", "obj": "OBJ", "vtk": "VTK", "vtp": "VTP", "glb": "GLB"}
 """The formats of meshes that are read, by their usual endings."""
 
-_VOLUME = "choose the segmentation among the label volumes (.nii, .nii.gz, .nrrd)"
 _MAGIC: tuple[tuple[bytes, str, str], ...] = (
     (b"\x1f\x8b", "compressed with gzip", "unpack it first"),
     (b"BZh", "compressed with bzip2", "unpack it first"),
     (b"\xfd7zXZ\x00", "compressed with xz", "unpack it first"),
     (b"\x28\xb5\x2f\xfd", "compressed with zstd", "unpack it first"),
-    (b"7z\xbc\xaf\x27\x1c", "a 7z archive", "unpack it and give the mesh inside"),
-    (b"Rar!", "a RAR archive", "unpack it and give the mesh inside"),
+    (b"7z\xbc\xaf\x27\x1c", "a 7z archive", "unpack it and give the file inside"),
+    (b"Rar!", "a RAR archive", "unpack it and give the file inside"),
     (b"%PDF", "a PDF document", "export the surface itself, as STL or PLY"),
     (b"\x89PNG", "a picture (PNG)", "export the surface itself, as STL or PLY"),
     (b"\xff\xd8\xff", "a picture (JPEG)", "export the surface itself, as STL or PLY"),
@@ -129,7 +128,7 @@ def _is_binary_stl(content: bytes, ending: str) -> bool:
     (faces,) = struct.unpack_from("<I", content, 80)
     if faces not in _NO_COUNT and len(content) == _STL_HEADER + _STL_FACE * faces:
         return True
-    return ending == "stl" and not is_text(content) and not _known(content)
+    return ending == "stl" and not is_text(content) and foreign(content) is None
 
 
 def _is_obj(content: bytes, ending: str) -> bool:
@@ -137,19 +136,15 @@ def _is_obj(content: bytes, ending: str) -> bool:
     return re.search(pattern, content[: 1 << 20], re.MULTILINE) is not None
 
 
-def _known(content: bytes) -> bool:
-    return foreign(content) is not None
-
-
 def foreign(content: bytes) -> tuple[str, str] | None:
-    """What a content is that is no mesh, and what to do with it; None where that is not known."""
+    """What a content, or its start, is that is no mesh, and what to do; None where that is not known."""
     start = content[:_START].lstrip()
     if content[:4] in (b"PK\x03\x04", b"PK\x05\x06"):
         is_3mf = b"3dmodel.model" in content or b"3D/" in content
         office = b"[Content_Types].xml" in content[:_START] and not is_3mf
         if is_3mf:
             return "a 3MF file", "save it as STL, PLY or OBJ"
-        return ("an Office document" if office else "a zip archive"), "unpack it and give the mesh inside"
+        return ("an Office document" if office else "a zip archive"), "unpack it and give the file inside"
     for mark, what, remedy in _MAGIC:
         if content.startswith(mark):
             return what, remedy
@@ -158,7 +153,7 @@ def foreign(content: bytes) -> tuple[str, str] | None:
     if content[128:132] == b"DICM":
         return "a DICOM image", "segment the scan and give the label volume or its surface"
     if content[257:262] == b"ustar":
-        return "a tar archive", "unpack it and give the mesh inside"
+        return "a tar archive", "unpack it and give the file inside"
     if start.startswith(b"{") and b'"asset"' in content:
         return "glTF as text", "save it as GLB"
     if start.startswith(b"<") and (name := _root(start)):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from naisr_model.data import formats
 from naisr_model.data.images.base import Image, beginning, content
 from naisr_model.data.images.nifti import read_nifti
 from naisr_model.data.images.nrrd import read_nrrd
@@ -17,13 +18,6 @@ FOREIGN = {
     rb"\s*(ObjectType|NDims)\s*=": "a MetaImage; save it as NIfTI or NRRD",
 }
 """Images in formats that are not read, by how they begin, and what to do with them."""
-
-STRANGE = {
-    rb"PK\x03\x04": "a zip archive; unpack it and give a file in it",
-    rb"BZh|\xfd7zXZ": "packed; unpack it, or pack it with gzip",
-    rb"(?i)\s*<(!doctype html|html)": "a web page; download the file itself",
-}
-"""What is no image, likewise."""
 
 _NIFTI = re.compile(rb"(?s).{344}n\+1|.{4}n\+2")
 _NRRD = re.compile(rb"NRRD\d{4}\s")
@@ -60,8 +54,8 @@ def read_image(path: str | Path) -> Image:
 
 
 def _not_known(path: Path, start: bytes) -> InputError:
-    for magic, what in STRANGE.items():
-        if re.match(magic, start):
-            return InputError(f"{path.name} is {what}")
+    what, remedy = formats.foreign(start) or ("", "")
+    if what and "volume" not in what:
+        return InputError(f"{path.name} is {what}; {remedy}")
     sentence = f"{path.name} holds neither NIfTI nor NRRD, so it is damaged, export it again"
     return InputError(f"{sentence}; if it is a mesh, give it the ending of one")
