@@ -17,6 +17,9 @@ from naisr_model import records
 SCALES_MM = (1e-6, 1e9)
 """Millimetres that a model unit may have, from far below to far above what anatomy has."""
 
+UNITS_MM = {"millimetres": 1.0, "metres": 1000.0, "centimetres": 10.0, "inches": 25.4, "micrometres": 0.001}
+"""What the lengths in a file may be in."""
+
 BOX_MARGIN = 1.15
 """How much wider than the widest shape the box is; far-field samples live in the margin."""
 

@@ -21,6 +21,7 @@ from naisr_model.data.align import Landmarks
 from naisr_model.data.remarks import Remark
 from naisr_model.data.sheets import numbered
 from naisr_model.data.tables import TableRow
+from naisr_model.frames import UNITS_MM
 
 Remarks = list[list[Remark]]
 """What is said of each row."""
@@ -61,8 +62,6 @@ FLIPS = {
     "mirrored upside down": (1.0, 1.0, -1.0),
 }
 """What exporters confuse, as signs of the axes."""
-
-UNITS_MM = {"metres": 1000.0, "inches": 25.4, "centimetres": 10.0, "micrometres": 0.001}
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,7 +267,8 @@ def _scale(rest: NDArray[np.float64], floor: float, usual: NDArray[np.bool_]) ->
 
 def _another_size(bulk: Bulk, ratio: float, certain: bool) -> Remark:
     sentence = f"the mesh is {bulk.length_mm:.3g} mm long, {_compared(ratio)} usual at such covariates"
-    fits = [unit for unit, factor in UNITS_MM.items() if abs(np.log(ratio * factor)) < np.log(1.6)]
+    others = {unit: factor for unit, factor in UNITS_MM.items() if factor != 1}
+    fits = [unit for unit, factor in others.items() if abs(np.log(ratio * factor)) < np.log(1.6)]
     remedy = "look at its unit, which must be millimetres, and at its covariates"
     if fits:
         remedy = f"its unit looks like {fits[0]}, so scale it by {UNITS_MM[fits[0]]:g}"

@@ -21,7 +21,7 @@ from naisr_model.data import formats, meshes, sheets, volumes
 from naisr_model.data.remarks import Remark, gravest_first
 from naisr_model.errors import InputError
 from naisr_model.files import require_file
-from naisr_model.frames import BOX_MARGIN, Frame
+from naisr_model.frames import BOX_MARGIN, UNITS_MM, Frame
 from naisr_model.numerals import LARGEST, decimal_marks, read_number
 
 POINT_ENDINGS = {".csv", ".txt", ".xyz"}
@@ -32,7 +32,6 @@ MOST_FACES = 500_000
 
 FEWEST_POINTS = 50
 
-UNITS_MM = {"millimetres": 1.0, "metres": 1000.0, "centimetres": 10.0, "inches": 25.4, "micrometres": 0.001}
 PLAUSIBLE_SIZE = (0.15, 1.3)
 """Longest side of a shape over that of the population's largest: from a newborn, or a piece, up."""
 
