@@ -78,7 +78,9 @@ class Checkpoint:
         """
         trained, length = int(np.sum(~self.population.held_out)), self.preset.network.latent
         if self.latents.shape != (trained, length):
-            raise ValueError(f"{_by(self.latents.shape)} codes where {trained} by {length} are expected")
+            raise ValueError(
+                f"{records.size(self.latents.shape)} codes where {trained} by {length} are expected"
+            )
         if self.preset.network.dim != self.frame.dim:
             raise ValueError(f"networks of {self.preset.network.dim}D shapes in a {self.frame.dim}D frame")
         if self.population.covariates and trained < 2:
@@ -228,13 +230,9 @@ def _require_layout(found: Mapping[str, Any], expected: Mapping[str, tuple[int, 
         raise ValueError(f"'{unknown[0]}' belongs to no network of it")
     for name, shape in expected.items():
         if (is_there := tuple(found[name].get_shape())) != shape:
-            raise ValueError(f"'{name}' is {_by(is_there)} where {_by(shape)} is expected")
+            raise ValueError(f"'{name}' is {records.size(is_there)} where {records.size(shape)} is expected")
         if found[name].get_dtype() != "F32":
             raise ValueError(f"'{name}' is of the type {found[name].get_dtype()} where F32 is expected")
-
-
-def _by(shape: tuple[int, ...]) -> str:
-    return " by ".join(map(str, shape)) or "a number"
 
 
 def _digest(record: str, tensors: Mapping[str, Tensor]) -> str:

@@ -79,7 +79,7 @@ def numbers(record: dict[str, Any], key: str, *shape: int) -> NDArray[np.float64
     except (TypeError, ValueError, OverflowError) as error:
         raise ValueError(f"'{key}' is no array of numbers") from error
     if array.shape != shape:
-        raise ValueError(f"'{key}' has {_by(array.shape)} numbers where {_by(shape)} are expected")
+        raise ValueError(f"'{key}' has {size(array.shape)} numbers where {size(shape)} are expected")
     if not (np.abs(array) <= LARGEST).all():
         raise ValueError(f"'{key}' holds what is no finite number")
     return array
@@ -139,6 +139,11 @@ def figures(record: dict[str, Any], key: str) -> dict[str, Any]:
     return values
 
 
+def size(shape: tuple[int, ...]) -> str:
+    """A shape in words: ``3 by 4``."""
+    return " by ".join(map(str, shape)) or "a number"
+
+
 def _present(record: dict[str, Any], key: str) -> Any:
     if key not in record:
         raise ValueError(f"'{key}' is missing")
@@ -149,7 +154,3 @@ def _of_kind(value: Any, kind: type[T], what: str) -> T:
     if type(value) is not kind:
         raise ValueError(f"{what} is {shortened(value)}, not {_TITLES[kind]}")
     return value
-
-
-def _by(shape: tuple[int, ...]) -> str:
-    return " by ".join(map(str, shape)) or "no"
