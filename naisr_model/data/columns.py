@@ -440,6 +440,6 @@ def _together(file: str, group: Sequence[Fault]) -> str:
     for fault in group:
         cells.setdefault(fault.cell, []).append(fault.row)
     listed = [f"{f'{cell!r}' if cell else 'empty'} in {numbered(rows)}" for cell, rows in cells.items()]
-    more = f" and {len(listed) - 5} others" if len(listed) > 5 else ""
+    more = f" and {len(listed) - 5} more" if len(listed) > 5 else ""
     what = first.what if first.cell else "; fill it in or drop the row"
     return f"column '{first.column}' is {', '.join(listed[:5])}{more}{what}"

@@ -36,7 +36,7 @@ from naisr_model.data.split import held_out_mask
 from naisr_model.data.stages import Look, Placed, Sampling, inspect, place, write_samples
 from naisr_model.data.tables import ShapeTable, TableRow
 from naisr_model.errors import InputError
-from naisr_model.files import replacing
+from naisr_model.files import replacing, telling
 from naisr_model.frames import Frame, enclosing_frame
 from naisr_model.progress import SILENT, Progress
 from naisr_model.work.alone import alone
@@ -46,7 +46,6 @@ REPORT = "report.json"
 _SAMPLES = re.compile(r"[0-9a-f]{24}")
 _HALF_DONE = re.compile(r"\.[0-9a-f]{24}\.\d+\.tmp")
 """Names of the folders that :func:`_sampling` and :func:`write_samples` make."""
-
 
 MOST_SAMPLES = 10_000_000
 """Of a kind and a shape: 240 MB."""
@@ -166,7 +165,8 @@ def _held(out: Path, name: str) -> Iterator[None]:
         InputError: when it holds something else, or another run writes there.
     """
     _require_own(out, name)
-    _make_folder(out / store.SHAPES)
+    with telling(out):
+        (out / store.SHAPES).mkdir(parents=True, exist_ok=True)
     with alone(out / ".lock", f"another run prepares {out}; wait until it has ended, or give another --out"):
         _remove(out / store.SHAPES, _HALF_DONE)
         try:
@@ -184,13 +184,6 @@ def _require_own(out: Path, name: str) -> None:
         return
     if other != name:
         raise InputError(f"{out} holds the store of '{other}', not of '{name}'; give another --out")
-
-
-def _make_folder(path: Path) -> None:
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"the folder {path} cannot be made ({error}); choose another place") from error
 
 
 def _report(
