@@ -3,40 +3,38 @@
 from __future__ import annotations
 
 import math
-import re
 
 from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtGui import QFocusEvent, QKeyEvent, QWheelEvent
 from PySide6.QtWidgets import QLineEdit, QToolTip, QWidget
 
 from naisr_model.covariates import Covariate
+from naisr_model.errors import InputError
 from naisr_viewer.words.numbers import written
 from naisr_viewer.words.titles import as_tip, label
 
 WIDTH_PX = 76
-NUMBER = re.compile(r"[-+−]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+−]?\d+)?")
-"""With a decimal point or comma, whatever the language of the system is."""
-
 STEPS = {Qt.Key.Key_Up: 1, Qt.Key.Key_Down: -1, Qt.Key.Key_PageUp: 10, Qt.Key.Key_PageDown: -10}
 EDITING = (Qt.Key.Key_A, Qt.Key.Key_C, Qt.Key.Key_V, Qt.Key.Key_X)
 UNDOING = (Qt.Key.Key_Z, Qt.Key.Key_Y)
 """With Ctrl, what a box keeps from the window's shortcuts; the latter only while something is being typed."""
 
 
-def parsed(text: str) -> float | None:
-    """A number as people write it; None for nothing, NaN for what is no number."""
-    text = text.strip()
-    if not text:
+def parsed(covariate: Covariate, text: str) -> float | None:
+    """A number as everywhere in the program; None for nothing, NaN for what is no number or in doubt."""
+    if not text.strip():
         return None
-    if not NUMBER.fullmatch(text):
+    try:
+        return covariate.parse(text)
+    except InputError:
         return math.nan
-    return float(text.replace(",", ".").replace("−", "-"))
 
 
 class NumberBox(QLineEdit):
     """A real value of a continuous covariate.
 
-    What is no number, or outside the observed range, stays as it was typed, is marked and is not taken.
+    What is no number, may be two, or is outside the observed range, stays as it was typed, is marked and is
+    not taken.
     """
 
     committed = Signal(float)  # a number inside the range is finished: by Enter, focus, arrow keys or wheel
@@ -54,8 +52,8 @@ class NumberBox(QLineEdit):
 
     @property
     def value(self) -> float | None:
-        """What the text says, to the last digit of what was shown; None for nothing, NaN for no number."""
-        return parsed(self.text()) if self._is_unfinished else self._taken
+        """What the text says, to the last digit of what was shown; None for nothing, NaN where it is none."""
+        return parsed(self.covariate, self.text()) if self._is_unfinished else self._taken
 
     @property
     def complaint(self) -> str:
@@ -63,7 +61,7 @@ class NumberBox(QLineEdit):
         value = self.value
         if value is None or self.covariate.contains(value):
             return ""
-        told = "no number" if math.isnan(value) else "outside the data behind the atlas"
+        told = "not understood" if math.isnan(value) else "outside the data behind the atlas"
         return f"“{self.text()}” is {told}: {self.covariate.extent}"
 
     @property
