@@ -8,12 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType, TracebackType
 
-from PySide6.QtCore import QBuffer, QIODevice, QObject, Signal
-from PySide6.QtGui import QCloseEvent, QImage, QImageWriter
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtGui import QCloseEvent
 
 from naisr_model.errors import InputError
 from naisr_viewer import __version__
 from naisr_viewer.control import jobs
+from naisr_viewer.control.pictures import write_picture
 from naisr_viewer.control.preferences import Preferences
 from naisr_viewer.control.preparation import Preparation
 from naisr_viewer.control.questions import Questions
@@ -23,7 +24,6 @@ from naisr_viewer.control.timeline import Timeline
 from naisr_viewer.control.worker import Worker
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.files.exports import in_the_way, planned
-from naisr_viewer.files.surfaces import write_atomically
 from naisr_viewer.panels.kinds import with_layout_of
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState, followed, opened, reset, reset_all, with_value
@@ -37,6 +37,9 @@ from naisr_viewer.words.numbers import in_words
 
 class Controller(QObject):
     """One window's life.
+
+    It is long because every act of the user ends here, a method for each; what an act means is in the rooms
+    beside it and in the state.
 
     Args:
         window: shows the state.
@@ -142,8 +145,7 @@ class Controller(QObject):
         if not (replaces or self.questions.may_replace([path] if path.exists() else [])):
             return
         try:
-            content = _encoded(self._window.grab_image(), path)
-            write_atomically(path, lambda place: place.write_bytes(content))
+            write_picture(path, self._window.grab_image())
         except InputError as error:
             self._window.show_error(in_words(error))
         else:
@@ -264,12 +266,3 @@ class Controller(QObject):
         if self._before_move is not None:
             before, self._before_move = self._before_move, None
             self._timeline.record(before, self.state)
-
-
-def _encoded(image: QImage, path: Path) -> bytes:
-    """The contents of a picture file; Qt would not say what keeps it from being written."""
-    content = QBuffer()
-    content.open(QIODevice.OpenModeFlag.WriteOnly)
-    if not QImageWriter(content, path.suffix[1:].encode() or b"none").write(image):
-        raise InputError(f"cannot write a picture to {path}; end its name with .png")
-    return bytes(content.data().data())

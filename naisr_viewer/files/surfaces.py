@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -22,16 +22,6 @@ from naisr_viewer.state.requests import Origin, SurfaceRequest, SurfaceResult
 
 if TYPE_CHECKING:
     import trimesh
-
-
-def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
-    """Let ``write`` fill a temporary file in the folder of ``path``, then put it in place.
-
-    Raises:
-        InputError: when the folder cannot be written to.
-    """
-    with replacing(path) as temporary:
-        write(temporary)
 
 
 POINT_FORMATS = ("ply", "vtp")
@@ -64,10 +54,12 @@ def write_surface(
     ending = next(each for each in FORMATS if each == ending_of(path))
     beside = record_of(path)
     content = mesh_bytes(_triangles(result), ending)
-    write_atomically(path, lambda place: place.write_bytes(content))
+    with replacing(path) as temporary:
+        temporary.write_bytes(content)
     record = description(result, atlas, path.name, patient, reference)
     text = json.dumps(record, indent=2, ensure_ascii=False) + "\n"
-    write_atomically(beside, lambda place: place.write_text(text, encoding="utf-8"))
+    with replacing(beside) as temporary:
+        temporary.write_text(text, encoding="utf-8")
     return path, beside
 
 

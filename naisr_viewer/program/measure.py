@@ -30,9 +30,9 @@ import numpy as np
 from PySide6.QtCore import QEventLoop, Qt, QTimer
 
 from naisr_model.errors import InputError
+from naisr_model.files import replacing
 from naisr_viewer.control.controller import Controller
 from naisr_viewer.engine.engine import Engine
-from naisr_viewer.files.surfaces import write_atomically
 from naisr_viewer.panels.kinds import request_for, visible_panels
 from naisr_viewer.state.layouts import FULL_SHAPE, Panel
 from naisr_viewer.state.requests import EXACT_RESOLUTION
@@ -184,7 +184,8 @@ def measure(
         **_figures(observer, events, released, len(visible_panels(controller.state))),
     }
     text = json.dumps(figures, indent=2) + "\n"
-    write_atomically(file, lambda place: place.write_text(text, encoding="utf-8"))
+    with replacing(file) as temporary:
+        temporary.write_text(text, encoding="utf-8")
 
 
 def _leave_the_centre(controller: Controller, observer: Observer) -> None:

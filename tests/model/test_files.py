@@ -50,6 +50,16 @@ def test_writing_leaves_the_mask_of_the_process_alone(tmp_path, monkeypatch):
         temporary.write_text("new")
 
 
+def test_a_failed_write_leaves_the_old_file_and_no_rubbish(tmp_path):
+    path = tmp_path / "shape.stl"
+    path.write_text("the old one")
+    with pytest.raises(InputError, match="No space left"), replacing(path) as temporary:
+        temporary.write_text("half of the new")
+        raise OSError(28, "No space left on device")
+    assert path.read_text() == "the old one"
+    assert os.listdir(tmp_path) == ["shape.stl"]
+
+
 @pytest.mark.parametrize("name", ["", ".", "/"])
 def test_a_folder_is_no_file_to_write(name):
     with pytest.raises(InputError, match="is a folder; give the name of a file"), replacing(Path(name)):

@@ -129,20 +129,6 @@ def test_an_effect_records_the_others_at_their_mean(engine, card):
     assert record["covariates"]["weight"]["value"] == 35.0
 
 
-def test_a_failed_write_leaves_the_old_file_and_no_rubbish(tmp_path):
-    path = tmp_path / "shape.stl"
-    path.write_text("the old one")
-
-    def fail(place: Path) -> None:
-        place.write_text("half of the new")
-        raise OSError(28, "No space left on device")
-
-    with pytest.raises(InputError, match="No space left"):
-        export.write_atomically(path, fail)
-    assert path.read_text() == "the old one"
-    assert os.listdir(tmp_path) == ["shape.stl"]
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no limit for files")
 @pytest.mark.parametrize("ending", FORMATS)
 def test_a_surface_that_finds_no_room_is_a_sentence_and_leaves_nothing(result, card, tmp_path, ending):
