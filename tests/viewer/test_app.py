@@ -77,7 +77,7 @@ def test_a_mesh_in_the_place_of_the_atlas_is_told_by_its_contents(capsys, tmp_pa
     egg(5.0, 1.0).export(tmp_path / "p01.stl")
     assert app.main([str(tmp_path / "p01.stl"), "--set", "age=3"]) == 2
     told = capsys.readouterr().err
-    assert "is an STL mesh, not an atlas" in told and "--scan p01.stl" in told and told.count("\n") == 1
+    assert "is a mesh (STL), not an atlas" in told and "--scan p01.stl" in told and told.count("\n") == 1
 
 
 def test_sizes():

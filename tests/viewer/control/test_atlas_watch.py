@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import os
 
 import pytest
@@ -10,21 +9,13 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel, QPushButton
 
-from naisr_viewer.program.start import make_window
-
 
 @pytest.fixture
-def ready(qtbot, engine, atlas_file, tmp_path):
-    window, controller = make_window(engine, tmp_path / "settings.ini")
-    window.show()
-    qtbot.waitExposed(window)
+def ready(whole_window, qtbot, engine, atlas_file):
+    window, controller = whole_window(engine)
     controller.open(atlas_file)
     qtbot.waitUntil(lambda: bool(controller.shown) and not controller.is_busy, timeout=30_000)
-    yield window, controller
-    window.close()
-    window.deleteLater()
-    qtbot.wait(0)
-    gc.collect()
+    return window, controller
 
 
 def replace_file(path) -> None:

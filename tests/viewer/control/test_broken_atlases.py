@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 from functools import partial
 
 import pytest
@@ -13,19 +12,11 @@ from safetensors.torch import load_file, save_file
 from naisr_model.checkpoint import FORMAT, save
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.program.headless import wait_until
-from naisr_viewer.program.start import make_window
 
 
 @pytest.fixture
-def opened(qtbot, tmp_path):
-    window, controller = make_window(Engine(folder=tmp_path / "cache"), tmp_path / "settings.ini")
-    window.show()
-    qtbot.waitExposed(window)
-    yield window, controller
-    window.close()
-    window.deleteLater()
-    qtbot.wait(0)
-    gc.collect()
+def opened(whole_window, tmp_path):
+    return whole_window(Engine(folder=tmp_path / "cache"))
 
 
 def tells(window, words: str) -> bool:
@@ -41,7 +32,7 @@ def test_broken_atlases_are_explained_one_after_the_other(opened, tmp_path):
         "nan.safetensors": "contradicts itself",
         "record.safetensors": "no JSON",
         "empty.safetensors": "is empty",
-        "mesh.stl": "is an STL mesh, not an atlas; open it as a scan: 'Open scan…'",
+        "mesh.stl": "is a mesh (STL), not an atlas; open it as a scan: 'Open scan…'",
     }
     save_file(broken, tmp_path / "nan.safetensors", {"format": FORMAT, "version": "1", "record": "{}"})
     save_file(tensors, tmp_path / "record.safetensors", {"format": FORMAT, "version": "1", "record": ""})

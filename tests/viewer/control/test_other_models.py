@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import gc
-
 import pytest
 from eggs import egg
 from PySide6.QtGui import QAction
@@ -12,7 +10,6 @@ from naisr_viewer.app import main
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.panels.kinds import all_panels, visible_panels
 from naisr_viewer.program.headless import finish, run_demo
-from naisr_viewer.program.start import make_window
 from naisr_viewer.state.layouts import FULL_SHAPE, Layout
 
 TOLERATED = 0.06
@@ -20,18 +17,11 @@ TOLERATED = 0.06
 
 
 @pytest.fixture
-def ready(qtbot, egg_deepsdf, tmp_path):
-    window, controller = make_window(Engine(folder=tmp_path / "cache"), tmp_path / "settings.ini")
-    window.resize(1280, 800)
-    window.show()
-    qtbot.waitExposed(window)
+def ready(whole_window, egg_deepsdf, tmp_path):
+    window, controller = whole_window(Engine(folder=tmp_path / "cache"))
     controller.open(egg_deepsdf)
     finish(window, controller)
-    yield window, controller
-    window.close()
-    window.deleteLater()
-    qtbot.wait(0)
-    gc.collect()
+    return window, controller
 
 
 def offered(window) -> set[str]:
