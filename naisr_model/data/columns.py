@@ -73,7 +73,7 @@ class Column:
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
+class Understood:
     """A covariate as it was understood.
 
     Attributes:
@@ -91,7 +91,7 @@ class Reading:
     told: str
 
 
-def read_column(column: Column, sheet_marks: Collection[str]) -> Reading:
+def read_column(column: Column, sheet_marks: Collection[str]) -> Understood:
     """Understand a covariate.
 
     Args:
@@ -130,7 +130,7 @@ def _guess(column: Column, numbers: Sequence[float]) -> str:
 # --- measured ----------------------------------------------------------------------------------
 
 
-def _continuous(column: Column, marks: Collection[str]) -> Reading:
+def _continuous(column: Column, marks: Collection[str]) -> Understood:
     values, faults = np.full(len(column.cells), math.nan), []
     for i, (row, cell) in enumerate(zip(column.rows, column.cells, strict=True)):
         try:
@@ -143,7 +143,7 @@ def _continuous(column: Column, marks: Collection[str]) -> Reading:
     covariate = Covariate(column.name, column.unit, "continuous", 0.0, 1.0, (low, high))
     told = f"{_title(column)}: a number from {low:g} to {high:g}, median {_median(good):.4g}"
     remarks = () if faults else _doubts(column, values)
-    return Reading(covariate, values, tuple(faults), remarks, told)
+    return Understood(covariate, values, tuple(faults), remarks, told)
 
 
 def _unvaried(column: Column, values: NDArray[np.float64]) -> list[Fault]:
@@ -266,7 +266,7 @@ def _where(column: Column, chosen: NDArray[np.bool_]) -> str:
 # --- two levels --------------------------------------------------------------------------------
 
 
-def _binary(column: Column, numbers: Sequence[float]) -> Reading:
+def _binary(column: Column, numbers: Sequence[float]) -> Understood:
     if "levels" in column.settings:
         levels = tuple(map(str, column.settings["levels"]))
         keys = [_matched(cell, number, levels) for cell, number in zip(column.cells, numbers, strict=True)]
@@ -283,7 +283,7 @@ def _binary(column: Column, numbers: Sequence[float]) -> Reading:
     counts = [sum(key == level for key in keys) for level in levels]
     told = f"{_title(column)}: {minus} in {_rows(counts[0])}, {plus} in {_rows(counts[1])}"
     remarks = () if faults else _level_remarks(column, levels, keys, numbers)
-    return Reading(covariate, values, tuple(faults), remarks, told)
+    return Understood(covariate, values, tuple(faults), remarks, told)
 
 
 def _rows(count: int) -> str:

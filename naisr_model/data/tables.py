@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 
 from naisr_model.covariates import Covariate, Kind, Population
 from naisr_model.data.align import METHODS, Alignment
-from naisr_model.data.columns import Column, Fault, Reading, read_column, refuse
+from naisr_model.data.columns import Column, Fault, Understood, read_column, refuse
 from naisr_model.data.remarks import Remark
 from naisr_model.data.sheets import Sheet, numbered, read_sheet, read_text, split_title
 from naisr_model.errors import InputError
@@ -306,7 +306,7 @@ def missing_files(table: ShapeTable) -> tuple[str, ...]:
 
 def _readings(
     path: Path, sheet: Sheet, titles: Mapping[str, tuple[str, str]], settings: Mapping[str, Any]
-) -> list[Reading]:
+) -> list[Understood]:
     """Every covariate as it is understood."""
     numbers = tuple(line.number for line in sheet.lines)
     columns = [
