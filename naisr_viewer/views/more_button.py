@@ -8,7 +8,6 @@ from PySide6.QtWidgets import QProxyStyle, QStyle, QStyleOption, QToolBar, QTool
 OF_QT = "qt_toolbar_ext_button"
 """The name under which Qt makes the button that opens the rest of a toolbar."""
 
-
 WIDTH_PX = 30
 
 
