@@ -89,7 +89,8 @@ class PatientList(QListWidget):
         close.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         close.setToolTip("Close this patient (Delete); the file stays as it is")
         close.setAccessibleName(f"Close {patient.name}")
-        close.clicked.connect(lambda: self.close_requested.emit(patient.key))
+        key = patient.key  # what Qt holds on to must not hold the scan
+        close.clicked.connect(lambda: self.close_requested.emit(key))
         return close
 
     def _key(self) -> int | None:
