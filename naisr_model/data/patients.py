@@ -305,7 +305,7 @@ def _units(patient: PatientShape, main_mm: NDArray[np.float64], frame: Frame) ->
         return _guessed(fits, sentence, patient.unit_mm)
     # Of known units, a short shape may be a small part; nothing makes a long one right.
     part = patient.units_known and longest < low * largest_mm
-    remedy = "say its unit (Unit in the window, --scale in a terminal), or check that it is this anatomy"
+    remedy = "scale it to millimetres (Unit in the window, else --scale), or check that it is this anatomy"
     return _Fault(Remark("look" if part else "refuse", "units", sentence, remedy))
 
 
@@ -330,7 +330,7 @@ def _voxel_indices(patient: PatientShape) -> Remark | None:
         return None
     sentence = "all coordinates are whole or half numbers, so they look like voxel indices"
     return Remark(
-        "look", "voxels", sentence, "if they are, give the voxel size in mm (--scale in a terminal)"
+        "look", "voxels", sentence, "if they are, give the voxel size in mm (--scale on the command line)"
     )
 
 
