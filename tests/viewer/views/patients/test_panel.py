@@ -178,13 +178,15 @@ def test_a_narrow_list_keeps_its_buttons_in_sight(panel, start, qtbot):
     panel.show_state(state)
     for width in (pp.PANEL_WIDTH, pp.LEAST_WIDTH, pp.PANEL_WIDTH):
         panel.resize(width, 600)
-        qtbot.waitUntil(lambda: all(map(reaches_the_edge, panel.list.findChildren(QToolButton))))
+        qtbot.waitUntil(
+            lambda: all(
+                reaches_the_edge(each, panel.list.viewport()) for each in panel.list.findChildren(QToolButton)
+            )
+        )
 
 
-def reaches_the_edge(close: QToolButton) -> bool:
+def reaches_the_edge(close: QToolButton, sight: QWidget) -> bool:
     """Whether a button is in sight as a whole, at the right edge of its list."""
-    row = close.parentWidget()
-    sight = row.parentWidget()
     return 0 <= sight.width() - close.mapTo(sight, QPoint(close.width(), 0)).x() <= 12
 
 
