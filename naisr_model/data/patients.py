@@ -321,7 +321,7 @@ def _units(patient: PatientShape, main_mm: NDArray[np.float64], frame: Frame) ->
         return _guessed(fits, sentence, patient.unit_mm, alone=not stated)
     # Of known units, a short shape may be a small part; nothing makes a long one right.
     part = patient.units_known and longest < low * largest_mm
-    remedy = "scale it to millimetres (--scale), or check that it is this anatomy"
+    remedy = "scale it to millimetres (Unit in the window, else --scale), or check that it is this anatomy"
     return _Fault(Remark("look" if part else "refuse", "units", sentence, remedy))
 
 
@@ -345,7 +345,9 @@ def _voxel_indices(patient: PatientShape) -> Remark | None:
     if np.abs(doubled - np.round(doubled)).max() > 1e-6:
         return None
     sentence = "all coordinates are whole or half numbers, so they look like voxel indices"
-    return Remark("look", "voxels", sentence, "if they are, give the voxel size in mm (--scale)")
+    return Remark(
+        "look", "voxels", sentence, "if they are, give the voxel size in mm (--scale on the command line)"
+    )
 
 
 def _position(main_mm: NDArray[np.float64], frame: Frame) -> Remark | None:

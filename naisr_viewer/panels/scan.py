@@ -7,7 +7,8 @@ from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Layout
 from naisr_viewer.state.requests import SurfaceResult
 from naisr_viewer.words.captions import Caption, beyond, large
-from naisr_viewer.words.numbers import length, volume
+from naisr_viewer.words.numbers import length
+from naisr_viewer.words.patients import size_of
 
 HINT = (
     "Distance of the scan to the full shape along its normal, in mm, to first order: "
@@ -18,8 +19,7 @@ HINT = (
 
 def _caption(state: ExplorerState, result: SurfaceResult) -> Caption:
     scan = state.shown.scan if state.shown else None
-    own = "open surface" if scan is None or scan.volume_cm3 is None else volume(scan.volume_cm3)
-    return Caption(large(own) + _away(state, result), HINT)
+    return Caption(large(size_of(scan) if scan else "…") + _away(state, result), HINT)
 
 
 def _away(state: ExplorerState, result: SurfaceResult) -> str:

@@ -73,7 +73,7 @@ def style_sheet(theme: Theme) -> str:
     #patientBar QComboBox QAbstractItemView {{ background: {t.raised}; border: 1px solid {t.line};
                 selection-background-color: {t.accent}; selection-color: {t.on_accent}; outline: none; }}
     #patientBar QComboBox QAbstractItemView::item {{ padding: 4px 8px; }}
-    #sidebar QCheckBox::indicator:unchecked, #patientBar QCheckBox::indicator:unchecked {{
+    QCheckBox::indicator:unchecked {{
                 background: {t.raised}; border: 1px solid {t.muted}; border-radius: 2px;
                 width: 12px; height: 12px; }}
     #small {{ padding: 1px 8px; font-size: 9pt; }}

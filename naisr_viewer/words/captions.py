@@ -53,4 +53,4 @@ def large(text: str) -> str:
 def beyond(colouring: Colouring) -> str:
     """A colour at the end of its scale says less than it seems to; empty where hardly any is."""
     share = float((np.abs(colouring.values) > colouring.limit).mean())
-    return f" · {100 * share:.0f} % beyond the scale" if share > WORTH_TELLING else ""
+    return f" · {100 * share:.0f}\u00a0% beyond the scale" if share > WORTH_TELLING else ""

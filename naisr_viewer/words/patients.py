@@ -34,11 +34,16 @@ def units(scale: float | None) -> tuple[tuple[float | None, str], ...]:
     return UNITS if scale in dict(UNITS) else (*UNITS, (scale, f"{scale:g} mm"))
 
 
-def measured(scan: Scan) -> str:
-    """The volume of a scan, or why it has none."""
+def size_of(scan: Scan) -> str:
+    """The volume of a scan, or what it is where it encloses none."""
     if scan.volume_cm3 is not None:
-        return f"encloses {volume(scan.volume_cm3)}"
-    return "open surface, no volume" if len(scan.faces) else "cloud of points, no volume"
+        return volume(scan.volume_cm3)
+    return "open surface" if len(scan.faces) else "cloud of points"
+
+
+def measured(scan: Scan) -> str:
+    """The volume of a scan, or why it has none, as a line of the panel."""
+    return f"{size_of(scan)}, no volume" if scan.volume_cm3 is None else f"encloses {size_of(scan)}"
 
 
 def findings(fit: Fitted, covariates: Sequence[Covariate]) -> list[tuple[str, str, str]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QSignalBlocker, QSize, Qt, Signal
-from PySide6.QtGui import QKeyEvent
+from PySide6.QtGui import QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
@@ -56,6 +56,11 @@ class PatientList(QListWidget):
             self.close_requested.emit(key)
         else:
             super().keyPressEvent(event)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Make what stands in the rows as wide as the list; Qt itself leaves it as it was."""
+        super().resizeEvent(event)
+        self.scheduleDelayedItemsLayout()
 
     def _fill(self) -> None:
         self.clear()

@@ -43,7 +43,7 @@ class PatientPanel(QFrame):
         self.setMinimumWidth(LEAST_WIDTH)
         self.setMaximumWidth(PANEL_WIDTH)
         self._state = ExplorerState()
-        self._drafts: dict[int, Named] = {}
+        self._drafts: dict[int, tuple[Named, Named]] = {}  # what was known when it was typed, and what was
         self._area = QScrollArea(self)
         self._inside = QWidget(self._area)
         self._head, self._foot = QWidget(self), QWidget(self)
@@ -105,12 +105,13 @@ class PatientPanel(QFrame):
     def _show_known(self, old: OpenScan | None, new: OpenScan | None) -> None:
         """What was typed belongs to its patient and is found again when that is shown again."""
         if old is not None and (new is None or new.key != old.key):
-            self._drafts[old.key] = self.known.given()
+            self._drafts[old.key] = (old.known, self.known.given())
         if new is None:
             return
         if old is None or old.key != new.key:
-            self.known.give(self._drafts.get(new.key, new.known))
-        elif new.known and new.known != old.known:
+            known, typed = self._drafts.get(new.key, (new.known, new.known))
+            self.known.give(typed if known == new.known else new.known)
+        elif new.known != old.known and (new.known or new.fit):
             self.known.give(new.known)
 
     def _show_patient(self, new: OpenScan, old: OpenScan | None) -> None:

@@ -88,6 +88,10 @@ FOREIGN = {
     "words.stl": (b"this is no mesh\n" * 9, r"is no STL file \(it begins with 'this is no mesh'\)"),
     "zeros.stl": (bytes(4096), "nothing but zeros"),
     "lfs.ply": (b"version https://git-lfs.github.com/spec/v1\n", "is a pointer of Git LFS"),
+    "atlas.stl": (
+        (64).to_bytes(8, "little") + b'{"weights":{"dtype":"F32","shape":[64]' + bytes(400),
+        "is an atlas or another .safetensors file; name it so",
+    ),
     "mesh.off.stl": (b"OFF\n8 6 0\n", "is an OFF file"),
 }
 

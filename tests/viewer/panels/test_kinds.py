@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
 
 from naisr_viewer.engine.answers.kinds import ANSWERS
 from naisr_viewer.panels.kinds import (
@@ -14,10 +17,13 @@ from naisr_viewer.panels.kinds import (
     visible_panels,
 )
 from naisr_viewer.state.atlas_card import AtlasCard
-from naisr_viewer.state.explorer import ExplorerState, opened
+from naisr_viewer.state.explorer import ExplorerState, opened, with_patient
 from naisr_viewer.state.layouts import FULL_SHAPE, TEMPLATE, Layout, Panel
+from naisr_viewer.state.patients import OpenScan, Reading, Scan
 from naisr_viewer.state.requests import SurfaceRequest
 from naisr_viewer.words.titles import label
+
+CORNERS = np.zeros((3, 3), np.float32)
 
 
 def ask(atlas: AtlasCard, resolution: int = 128, age: float = 100.0) -> SurfaceRequest:
@@ -54,6 +60,20 @@ def test_layouts_show_their_panels_in_order(card):
     state = opened(ExplorerState(), card)
     assert visible_panels(replace(state, layout=Layout.FULL_SHAPE)) == panels_in(Layout.FULL_SHAPE, card)
     assert visible_panels(ExplorerState()) == ()
+
+
+def test_a_scan_is_called_what_it_is(engine, card):
+    patient = OpenScan(
+        1, "p", Reading(Path("p")), Scan(CORNERS, CORNERS, np.zeros((0, 3), int), "p, 3 points")
+    )
+    triangle = replace(patient, scan=replace(patient.scan, faces=np.array([[0, 1, 2]])))
+    closed = replace(patient, scan=replace(triangle.scan, volume_cm3=41.5))
+    surface, start = engine.surface(ask(card)), opened(ExplorerState(), card)
+    told = [
+        KINDS["scan"].caption(with_patient(start, each), surface).text for each in (patient, triangle, closed)
+    ]
+    for word, text in zip(("cloud of points", "open surface", "41.5 cm³"), told, strict=True):
+        assert word in text
 
 
 def test_a_finer_surface_answers_a_coarser_question(engine, card):

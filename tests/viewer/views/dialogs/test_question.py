@@ -12,6 +12,8 @@ from PySide6.QtWidgets import QApplication, QLabel, QMessageBox, QPushButton, QW
 from naisr_viewer.state.questions import QUESTIONS, REPLACE_FILES, Answer
 from naisr_viewer.views.dialogs.preferences import PreferencesDialog, ask_preferences
 from naisr_viewer.views.dialogs.question import ask
+from naisr_viewer.views.style_sheet import style_sheet
+from naisr_viewer.views.theme import DARK, LIGHT, Theme, palette
 from naisr_viewer.words.questions import NAMED, in_the_place_of
 
 FILES = [Path(f"/out/eggs-{number}.stl") for number in range(NAMED + 2)]
@@ -84,3 +86,20 @@ def test_every_question_can_be_wanted_again(parent):
     assert ask_preferences(parent, asked) == dict.fromkeys(QUESTIONS, True)
     QTimer.singleShot(0, lambda: press(Qt.Key.Key_Escape))
     assert ask_preferences(parent, asked) is None
+
+
+@pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
+@pytest.mark.parametrize("is_ticked", [False, True])
+def test_a_tick_box_stands_out_from_its_ground(qtbot, theme: Theme, is_ticked):
+    before = QApplication.palette()
+    QApplication.setPalette(palette(theme))
+    dialog = PreferencesDialog(dict.fromkeys(QUESTIONS, is_ticked))
+    qtbot.addWidget(dialog)
+    dialog.setStyleSheet(style_sheet(theme))
+    dialog.show()
+    qtbot.waitExposed(dialog)
+    box = next(iter(dialog.boxes.values()))
+    picture = box.grab().toImage()
+    greys = [picture.pixelColor(x, box.height() // 2).lightness() for x in range(box.height())]
+    QApplication.setPalette(before)
+    assert max(greys) - min(greys) > 60

@@ -171,6 +171,25 @@ def test_the_list_grows_to_four_rows(panel, start):
     assert panel.list.visualItemRect(panel.list.currentItem()).bottom() <= panel.list.viewport().height()
 
 
+def test_a_narrow_list_keeps_its_buttons_in_sight(panel, start, qtbot):
+    state = start
+    for key in range(1, 7):
+        state = with_patient(state, replace(ONE, key=key))
+    panel.show_state(state)
+    for width in (pp.PANEL_WIDTH, pp.LEAST_WIDTH, pp.PANEL_WIDTH):
+        panel.resize(width, 600)
+        qtbot.waitUntil(
+            lambda: all(
+                reaches_the_edge(each, panel.list.viewport()) for each in panel.list.findChildren(QToolButton)
+            )
+        )
+
+
+def reaches_the_edge(close: QToolButton, sight: QWidget) -> bool:
+    """Whether a button is in sight as a whole, at the right edge of its list."""
+    return 0 <= sight.width() - close.mapTo(sight, QPoint(close.width(), 0)).x() <= 12
+
+
 # --- the scan and where it lies -----------------------------------------------------------------
 
 
@@ -367,6 +386,21 @@ def test_what_a_fit_was_told_is_shown(panel, start):
     panel.show_state(with_patient(start, replace(ONE, known=(("age", 84.0), ("sex", 1.0)), fit=FIT)))
     assert panel.known.given() == (("age", 84.0), ("sex", 1.0))
     assert panel.known.fit.text() == "Fit again"
+
+
+def test_beside_a_result_stands_what_its_fit_was_told(panel, start):
+    first = with_patient(with_patient(start, TWO), replace(ONE, known=(("age", 84.0),), fit=FIT))
+    second = with_patient(first, replace(ONE, known=(("age", 96.0),), fit=replace(FIT, person=2)))
+    panel.show_state(first)
+    panel.show_state(showing(first, 2))
+    panel.show_state(first)
+    panel.show_state(second)  # fitted again
+    panel.show_state(first)  # undone
+    panel.show_state(showing(first, 2))
+    panel.show_state(second)  # and done again, from another patient
+    assert panel.known.given() == (("age", 96.0),)
+    panel.show_state(with_patient(first, replace(ONE, fit=FIT)))
+    assert panel.known.given() == ()
 
 
 def test_another_atlas_has_other_rows(panel, start, card):
