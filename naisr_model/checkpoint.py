@@ -183,6 +183,8 @@ FARTHEST = 1e6
 def _foreign(path: Path) -> str:
     """What a file is that is no .safetensors file, by its contents, and what to do."""
     content = formats.content_of(path)
+    if formats.is_tensors(content):
+        return "is not a complete .safetensors file; copy it again, or train it again"
     mesh = formats.format_of(formats.plain(content), path.suffix.lower().removeprefix("."))
     others = [title for magic, title in _OTHERS.items() if content.startswith(magic)]
     what, _ = formats.foreign(content) or ("", "")

@@ -148,7 +148,7 @@ def foreign(content: bytes) -> tuple[str, str] | None:
     for mark, what, remedy in _MAGIC:
         if content.startswith(mark):
             return what, remedy
-    if _is_tensors(content):
+    if is_tensors(content):
         return "an atlas or another .safetensors file", "name it so, and open it as an atlas if it is one"
     if content[344:348] in _NIFTI or content[4:8] == b"n+2\0":
         return "a NIfTI volume", "name it .nii"
@@ -163,7 +163,7 @@ def foreign(content: bytes) -> tuple[str, str] | None:
     return None
 
 
-def _is_tensors(content: bytes) -> bool:
+def is_tensors(content: bytes) -> bool:
     """Whether it begins as safetensors do: with the length of a header in JSON, and that header."""
     length = int.from_bytes(content[:8], "little")
     return 2 <= length <= 100_000_000 and content[8:10] == b'{"'

@@ -202,7 +202,7 @@ UNUSABLE = {
     "words.nii": (b"this is no image\n" * 40, "damaged, export it again"),
     "words.nii.gz": (b"this is no image\n" * 40, "damaged, export it again"),
     "words.nrrd": (b"this is no image\n" * 40, "damaged, export it again"),
-    "empty.nii": (b"", "is empty; copy or export it again"),
+    "empty.nii": (b"", r"is empty \(0 bytes\); copy or export it again"),
 }
 
 
