@@ -6,6 +6,7 @@ STL, PLY, OBJ and VTP hold millimetres in the frame of the atlas, z up. GLB hold
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -22,6 +23,11 @@ GLB_TO_MM: NDArray[np.float64] = np.array(
     [[1000.0, 0, 0, 0], [0, 0, -1000.0, 0], [0, 1000.0, 0, 0], [0, 0, 0, 1.0]]
 )
 """4x4, metres with y up to millimetres with z up: ``(x, y, z) -> 1000 (x, -z, y)``."""
+
+
+def format_named(path: Path) -> MeshFormat | None:
+    """The format that the ending of a file asks for; None where it is none of them."""
+    return next((each for each in FORMATS if path.suffix.lower() == f".{each}"), None)
 
 
 def mesh_bytes(mesh_mm: trimesh.Trimesh, ending: MeshFormat) -> bytes:

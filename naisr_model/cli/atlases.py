@@ -12,7 +12,7 @@ from cyclopts import Parameter
 
 from naisr_model.cli.options import AtlasFile, FileToWrite
 from naisr_model.errors import InputError
-from naisr_model.files import checked_place, replacing
+from naisr_model.files import replacing
 
 if TYPE_CHECKING:
     from naisr_model.covariates import Covariate, Population  # loads numpy, which '--help' does not need
@@ -106,14 +106,13 @@ def mesh(
     """
     from naisr_model.atlas import Atlas
     from naisr_model.covariates import read_values, require_known
-    from naisr_model.exports import FORMATS, mesh_bytes
+    from naisr_model.exports import format_named, mesh_bytes
 
-    ending = next((each for each in FORMATS if out.suffix.lower() == f".{each}"), None)
+    ending = format_named(out)
     if ending is None:
         raise InputError(f"cannot write '{out.suffix}'; name the file .stl, .ply, .obj, .vtp or .glb")
     if template and (effect is not None or set):
         raise InputError("the template depends on no covariate; leave out --effect and --set")
-    checked_place(out)
     loaded = Atlas.load(atlas, device)
     if set and not loaded.covariates:
         raise InputError(f"shapes of {loaded.model_title} depend on no covariates; leave out --set")

@@ -214,21 +214,22 @@ def _is_far(value: float, values: NDArray[np.float64]) -> bool:
 
 
 def _suspected(column: Column, values: NDArray[np.float64], code: float) -> Remark:
-    rest = values[values != code]
-    sentence = (
-        f"'{column.name}' is {code:g} in {_where(column, values == code)}, and otherwise "
-        f"{rest.min():g} to {rest.max():g}"
-    )
+    sentence = f"{_apart(column, values, code)}, and otherwise {_range(values[values != code])}"
     return Remark("look", "missing", sentence, "if that stands for a missing value, drop the row")
 
 
 def _strayed(column: Column, values: NDArray[np.float64], value: float) -> Remark:
-    rest = values[values != value]
-    sentence = (
-        f"'{column.name}' is {value:g} in {_where(column, values == value)}, far from the others, which are "
-        f"{rest.min():g} to {rest.max():g}"
-    )
+    others = _range(values[values != value])
+    sentence = f"{_apart(column, values, value)}, far from the others, which are {others}"
     return Remark("look", "outlier", sentence, "look for a slip of the pen or another unit")
+
+
+def _apart(column: Column, values: NDArray[np.float64], value: float) -> str:
+    return f"'{column.name}' is {value:g} in {_where(column, values == value)}"
+
+
+def _range(values: NDArray[np.float64]) -> str:
+    return f"{values.min():g} to {values.max():g}"
 
 
 def _look_like_categories(column: Column, values: NDArray[np.float64]) -> bool:

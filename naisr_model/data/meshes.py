@@ -104,8 +104,7 @@ def sound_mesh(path: str | Path) -> MeshFile:
         InputError: as :func:`read_mesh` and :func:`check_mesh`.
     """
     file = _with_faces(path, read_file(path))
-    mesh, mended = mended_mesh(file.mesh_mm)
-    mesh = faced_outward(mesh)
+    mesh, mended = repair_mesh(file.mesh_mm)
     stated = (
         (Remark("look", "space", "the file says that its coordinates are RAS"),)
         if file.space == "RAS"
@@ -210,9 +209,10 @@ def _stated_space(content: bytes) -> Literal["LPS", "RAS", ""]:
     return "RAS" if b"SPACE=RAS" in start else "LPS" if b"SPACE=LPS" in start else ""
 
 
-def repair_mesh(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+def repair_mesh(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, tuple[Remark, ...]]:
     """Mend a mesh as :func:`mended_mesh` does and turn its faces outward as :func:`faced_outward` does."""
-    return faced_outward(mended_mesh(mesh)[0])
+    mesh, mended = mended_mesh(mesh)
+    return faced_outward(mesh), mended
 
 
 def mended_mesh(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, tuple[Remark, ...]]:

@@ -427,23 +427,9 @@ def scaled(patient: PatientShape, factor: ArrayLike) -> PatientShape:
     return moved(patient, np.diag([*np.broadcast_to(np.asarray(factor, float), 3), 1.0]))
 
 
-def ras_to_lps(patient: PatientShape) -> PatientShape:
-    """Half a turn about z, which leads from RAS to LPS and back."""
-    return replace(moved(patient, np.diag([-1.0, -1.0, 1.0, 1.0])), space="LPS")
-
-
 def flipped(patient: PatientShape) -> PatientShape:
     """Faces that look inward turned round."""
     return replace(patient, mesh_mm=_outward(patient.mesh_mm))
-
-
-def largest_component(patient: PatientShape) -> PatientShape:
-    """The component with the largest area alone; cavities, which are components too, are filled."""
-    component, areas = meshes.component_areas(patient.mesh_mm)
-    mesh = patient.mesh_mm.copy()
-    mesh.update_faces(component == areas.argmax())
-    mesh.remove_unreferenced_vertices()
-    return replace(patient, mesh_mm=mesh)
 
 
 def decimated(patient: PatientShape, faces: int = MOST_FACES // 2) -> PatientShape:

@@ -161,6 +161,16 @@ def labels(path: str | Path) -> dict[int | str, str] | None:
     return volumes.titles(Path(path).name, volumes.read_labels(path))
 
 
+def require_label(path: str | Path, label: int | str | None) -> None:
+    """Make sure that it is clear what :func:`read` reads of a label volume; other files are left alone.
+
+    Raises:
+        InputError: naming the labels, when it is not, or when the volume cannot be used.
+    """
+    if volumes.is_label_volume(path):
+        volumes.choose(Path(path).name, volumes.read_labels(path), label)
+
+
 def read(path: Path, atlas: Atlas, label: int | str | None = None, scale: float | None = None) -> Intake:
     """Read a patient's file, repair what can be repaired and find what is still the matter.
 

@@ -50,6 +50,17 @@ class Clinic:
         titles = intake.labels(reading.path) if reading.label is None else None
         return Labels(reading, tuple(titles.items())) if titles and not _is_clear(titles) else None
 
+    @staticmethod
+    def require_label(reading: Reading) -> None:
+        """Make sure that it is clear which label is meant, where nobody can be asked.
+
+        Raises:
+            InputError: naming the labels, when it is not, or when the volume cannot be used.
+        """
+        from naisr_model.patients import intake
+
+        intake.require_label(reading.path, reading.label)
+
     def read(self, atlas: Path, reading: Reading, known: Named, progress: Progress = SILENT) -> Scan:
         """Read a patient's file as asked and bring it into the frame of an open atlas.
 

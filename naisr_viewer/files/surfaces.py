@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from naisr_model.covariates import Covariate
 from naisr_model.errors import InputError
-from naisr_model.exports import FORMATS, mesh_bytes
+from naisr_model.exports import FORMATS, MeshFormat, format_named, mesh_bytes
 from naisr_model.files import replacing
 from naisr_viewer import __version__
 from naisr_viewer.panels.kinds import kind_of, title_of
@@ -50,8 +50,7 @@ def write_surface(
     Raises:
         InputError: when there is no surface to write, or the ending or folder will not do.
     """
-    require_writable(path, result)
-    ending = next(each for each in FORMATS if each == ending_of(path))
+    ending = require_writable(path, result)
     beside = record_of(path)
     content = mesh_bytes(_triangles(result), ending)
     with replacing(path) as temporary:
@@ -63,26 +62,22 @@ def write_surface(
     return path, beside
 
 
-def require_writable(path: Path, result: SurfaceResult) -> None:
-    """Make sure that a surface can be written to a file of this ending.
+def require_writable(path: Path, result: SurfaceResult) -> MeshFormat:
+    """Make sure that a surface can be written to a file of this ending, and say in which format.
 
     Raises:
         InputError: when it cannot.
     """
     if len(result.points_mm) == 0:
         raise InputError(f"{title_of(result.request.panel)} has no surface at these values; nothing to write")
-    ending = ending_of(path)
-    if ending not in FORMATS:
+    ending = format_named(path)
+    if ending is None:
         raise InputError(f"cannot write '{path.name}'; the ending must be one of {', '.join(FORMATS)}")
     if len(result.faces) == 0 and ending not in POINT_FORMATS:
         raise InputError(
             f"{path.name} would hold a cloud of points; export it as {' or '.join(POINT_FORMATS)}"
         )
-
-
-def ending_of(path: Path) -> str:
-    """``ply`` of ``a/shape.PLY``."""
-    return path.suffix.lower().removeprefix(".")
+    return ending
 
 
 def record_of(path: Path) -> Path:
@@ -109,13 +104,13 @@ def description(
         "view": title_of(request.panel),
         "covariates": _covariate_records(atlas, given),
         "depends_on": sorted(given),
-        "length_unit": "m" if ending_of(Path(file_name)) == "glb" else "mm",
-        "up": "y" if ending_of(Path(file_name)) == "glb" else "z",
+        "length_unit": "m" if format_named(Path(file_name)) == "glb" else "mm",
+        "up": "y" if format_named(Path(file_name)) == "glb" else "z",
         "volume_cm3": None if is_scan and not result.volume_cm3 else round(result.volume_cm3, 4),
         "volume_cm3_is": OF_SCAN if is_scan else OF_SURFACE,
         "volume_of_triangles_cm3": round(_triangles(result).volume / 1000, 4) if len(result.faces) else None,
         "volume_95_percent_margin_cm3": None if margin is None else round(margin, 4),
-        "numbers": _numbers_record(result, ending_of(Path(file_name))),
+        "numbers": _numbers_record(result, format_named(Path(file_name))),
         "patient": None if patient is None else _patient_record(patient),
         "before": _before_record(request, atlas, reference),
         "vertices": len(result.points_mm),
@@ -135,7 +130,7 @@ def _numbers(result: SurfaceResult) -> dict[str, NDArray[np.float32]]:
     return {} if coloured is None else {kind_of(result.request.panel).array: coloured.values}
 
 
-def _numbers_record(result: SurfaceResult, ending: str) -> dict[str, Any] | None:
+def _numbers_record(result: SurfaceResult, ending: MeshFormat | None) -> dict[str, Any] | None:
     """What the numbers at the vertices are, and whether the file holds them."""
     if result.colouring is None:
         return None

@@ -18,7 +18,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from naisr_model.errors import InputError
 from naisr_viewer.engine.atlases import load_atlas, require_device
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.program.display import ensure_display, require_display
@@ -33,9 +32,6 @@ if TYPE_CHECKING:
 
 SETTINGS = ("naisr", "naisr-viewer")
 """Under whose name the user's settings are kept."""
-
-MOST_LISTED = 8
-"""Labels in a message."""
 
 
 @dataclass(frozen=True)
@@ -214,10 +210,12 @@ def unattended(
     engine: Engine, first: First, pixels: tuple[int, int], screenshot: Path | None, demo: Path | None
 ) -> int:
     """The same window without a person."""
+    from naisr_viewer.engine.clinic import Clinic
     from naisr_viewer.program import headless
 
     assert first.card is not None
-    require_one_label(engine, first.reading)
+    if first.reading is not None:
+        Clinic.require_label(first.reading)
     ensure_display(pixels)
     with own_window(engine) as (window, controller):
         window.resize(*pixels)
@@ -231,22 +229,6 @@ def unattended(
         if demo is not None:
             headless.run_demo(window, controller, demo)
     return 0
-
-
-def require_one_label(engine: Engine, reading: Reading | None) -> None:
-    """Refuse a volume of several labels of which none is chosen, where nobody can be asked.
-
-    Raises:
-        InputError: naming the labels.
-    """
-    from naisr_viewer.engine.clinic import Clinic
-
-    found = None if reading is None else Clinic(engine).labels(reading)
-    if found is not None:
-        count, listed = len(found.titles), ", ".join(title for _, title in found.titles[:MOST_LISTED])
-        more = f" and {count - MOST_LISTED} more" if count > MOST_LISTED else ""
-        labels = f"{count} labels" if count > 1 else "a negative label alone"
-        raise InputError(f"{found.reading.path.name} has {labels} ({listed}{more}); choose one with --label")
 
 
 @contextmanager

@@ -15,6 +15,9 @@ from naisr_model.errors import InputError
 
 NO_FACES = np.zeros((0, 3), np.int64)
 
+C_TYPES = {"char": "i1", "short": "i2", "int": "i4", "float": "f4", "double": "f8"}
+"""Types of numbers as several formats call them, and as NumPy does."""
+
 
 class Parts(NamedTuple):
     """What is in a file of a shape.

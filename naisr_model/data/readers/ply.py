@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from naisr_model.data.readers.parts import (
+    C_TYPES,
     NO_FACES,
     Parts,
     check_indices,
@@ -22,29 +23,21 @@ from naisr_model.data.readers.parts import (
 )
 from naisr_model.errors import InputError
 
-_TYPES = dict(
-    pair.split(":")
-    for pair in [
-        "char:i1",
-        "uchar:u1",
-        "short:i2",
-        "ushort:u2",
-        "int:i4",
-        "uint:u4",
-        "float:f4",
-        "double:f8",
-        "int8:i1",
-        "uint8:u1",
-        "int16:i2",
-        "uint16:u2",
-        "int32:i4",
-        "uint32:u4",
-        "int64:i8",
-        "uint64:u8",
-        "float32:f4",
-        "float64:f8",
-    ]
-)
+_TYPES = C_TYPES | {
+    "uchar": "u1",
+    "ushort": "u2",
+    "uint": "u4",
+    "int8": "i1",
+    "int16": "i2",
+    "int32": "i4",
+    "int64": "i8",
+    "uint8": "u1",
+    "uint16": "u2",
+    "uint32": "u4",
+    "uint64": "u8",
+    "float32": "f4",
+    "float64": "f8",
+}
 _CORNERS = ("vertex_indices", "vertex_index")
 _LISTED = ("vertex", "range_grid", "material")
 """Elements that have lists and are no faces."""

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from naisr_model.data.readers.parts import (
+    C_TYPES,
     NO_FACES,
     Parts,
     check_indices,
@@ -25,25 +26,17 @@ from naisr_model.data.readers.parts import (
 )
 from naisr_model.errors import InputError
 
-_TYPES = dict(
-    pair.split(":")
-    for pair in [
-        "char:i1",
-        "unsigned_char:u1",
-        "short:i2",
-        "unsigned_short:u2",
-        "int:i4",
-        "unsigned_int:u4",
-        "long:i8",
-        "unsigned_long:u8",
-        "float:f4",
-        "double:f8",
-        "vtktypeint64:i8",
-        "vtktypeint32:i4",
-        "vtktypeuint64:u8",
-        "vtkidtype:i4",
-    ]
-)
+_TYPES = C_TYPES | {
+    "unsigned_char": "u1",
+    "unsigned_short": "u2",
+    "unsigned_int": "u4",
+    "long": "i8",
+    "unsigned_long": "u8",
+    "vtktypeint64": "i8",
+    "vtktypeint32": "i4",
+    "vtktypeuint64": "u8",
+    "vtkidtype": "i4",
+}
 _CELLS = ("VERTICES", "LINES", "POLYGONS", "TRIANGLE_STRIPS", "CELLS")
 _GRIDS = ("STRUCTURED_POINTS", "RECTILINEAR_GRID")
 _GRID = "holds a grid of voxels; give a surface, or labels as NIfTI or NRRD"

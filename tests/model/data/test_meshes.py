@@ -38,7 +38,7 @@ def test_every_format_reads_back_the_same_surface(tmp_path, ellipsoid, suffix):
         path.write_bytes(mesh_bytes(ellipsoid, "glb"))
     else:
         pyvista.wrap(ellipsoid).save(path)
-    mesh = repair_mesh(read_mesh(path))
+    mesh = repair_mesh(read_mesh(path))[0]
     assert mesh.is_watertight
     assert len(mesh.faces) == len(ellipsoid.faces)
     np.testing.assert_allclose(mesh.bounds, ellipsoid.bounds, atol=1e-4)
@@ -50,7 +50,7 @@ def test_polygons_and_upper_case_endings_are_read(tmp_path):
     box = pyvista.Box((0.0, 1.0, 0.0, 2.0, 0.0, 3.0), quads=True)
     box.save(tmp_path / "box.ply")
     path = (tmp_path / "box.ply").rename(tmp_path / "BOX.PLY")
-    assert repair_mesh(read_mesh(path)).volume == pytest.approx(6.0)
+    assert repair_mesh(read_mesh(path))[0].volume == pytest.approx(6.0)
 
 
 @pytest.mark.parametrize("suffix", [".stl", ".ply", ".obj", ".vtk", ".vtp", ".glb"])
@@ -138,14 +138,14 @@ def test_triangles_that_rounding_took_apart_are_one_surface(ellipsoid, gap_mm):
     corners = ellipsoid.vertices[ellipsoid.faces].reshape(-1, 3)
     apart = corners + np.random.default_rng(0).uniform(-gap_mm, gap_mm, corners.shape)
     soup = trimesh.Trimesh(apart, np.arange(len(apart)).reshape(-1, 3), process=False)
-    mesh = repair_mesh(soup)
+    mesh = repair_mesh(soup)[0]
     assert mesh.is_watertight and len(mesh.vertices) == len(ellipsoid.vertices)
     assert mesh.volume == pytest.approx(ellipsoid.volume, rel=1e-4)
 
 
 def test_a_gap_that_is_one_is_not_welded(ellipsoid):
     wide = trimesh.Trimesh(ellipsoid.vertices, ellipsoid.faces[1:], process=False)
-    assert len(repair_mesh(wide).faces) == len(ellipsoid.faces) - 1
+    assert len(repair_mesh(wide)[0].faces) == len(ellipsoid.faces) - 1
 
 
 def test_repair_merges_vertices_and_drops_useless_faces(ellipsoid):
@@ -153,7 +153,7 @@ def test_repair_merges_vertices_and_drops_useless_faces(ellipsoid):
         ellipsoid.triangles.reshape(-1, 3), np.arange(3 * len(ellipsoid.faces)).reshape(-1, 3), process=False
     )
     extra = np.vstack([soup.faces, [[0, 0, 1]], soup.faces[:1]])
-    mesh = repair_mesh(trimesh.Trimesh(soup.vertices, extra, process=False))
+    mesh = repair_mesh(trimesh.Trimesh(soup.vertices, extra, process=False))[0]
     assert len(mesh.vertices) == len(ellipsoid.vertices)
     assert len(mesh.faces) == len(ellipsoid.faces)
     assert mesh.is_watertight
@@ -164,7 +164,7 @@ def test_repair_turns_faces_outward(ellipsoid, turned):
     rng = np.random.default_rng(0)
     flip = np.ones(len(ellipsoid.faces), bool) if turned == "all" else rng.random(len(ellipsoid.faces)) < 0.7
     faces = np.where(flip[:, None], ellipsoid.faces[:, ::-1], ellipsoid.faces)
-    mesh = repair_mesh(trimesh.Trimesh(ellipsoid.vertices, faces, process=False))
+    mesh = repair_mesh(trimesh.Trimesh(ellipsoid.vertices, faces, process=False))[0]
     assert mesh.volume == pytest.approx(ellipsoid.volume)
     outward = np.einsum("ij,ij->i", mesh.face_normals, mesh.triangles_center - mesh.centroid)
     assert (outward > 0).all()
@@ -177,7 +177,7 @@ def test_an_inside_out_neighbour_is_turned_but_a_cavity_is_kept():
     expected = outer.volume - cavity.volume + neighbour.volume
     cavity.invert()
     neighbour.invert()
-    mesh = repair_mesh(outer + cavity + neighbour)
+    mesh = repair_mesh(outer + cavity + neighbour)[0]
     assert mesh.volume == pytest.approx(expected)
     assert [remark.topic for remark in check_mesh(mesh)] == ["components"]
 
@@ -185,7 +185,7 @@ def test_an_inside_out_neighbour_is_turned_but_a_cavity_is_kept():
 def test_small_holes_are_bearable_and_said(ellipsoid):
     keep = np.random.default_rng(0).random(len(ellipsoid.faces)) > 0.01
     ellipsoid.update_faces(keep)
-    (oddity,) = check_mesh(repair_mesh(ellipsoid))
+    (oddity,) = check_mesh(repair_mesh(ellipsoid)[0])
     assert "open edges" in oddity.text
 
 
@@ -198,7 +198,7 @@ def test_what_bounds_no_body_is_rejected(ellipsoid):
         check_mesh(doubled)
     ellipsoid.update_faces(ellipsoid.triangles_center[:, 2] < 50.0)
     with pytest.raises(InputError, match="open"):
-        check_mesh(repair_mesh(ellipsoid))
+        check_mesh(repair_mesh(ellipsoid)[0])
     with pytest.raises(InputError, match="no faces"):
         check_mesh(trimesh.Trimesh())
 
@@ -206,7 +206,7 @@ def test_what_bounds_no_body_is_rejected(ellipsoid):
 def test_islands_between_missing_faces_keep_their_side(ellipsoid):
     keep = np.random.default_rng(1).random(len(ellipsoid.faces)) > 0.4
     ellipsoid.update_faces(keep)
-    mesh = repair_mesh(ellipsoid)
+    mesh = repair_mesh(ellipsoid)[0]
     outward = np.einsum("ij,ij->i", mesh.face_normals, mesh.triangles_center - [3.0, -2.0, 50.0])
     assert (outward > 0).all()
 
@@ -235,7 +235,7 @@ def with_a_third_corner_on_an_edge(mesh: trimesh.Trimesh, filled: bool) -> trime
 
 @pytest.mark.parametrize("filled", [True, False])
 def test_slits_do_not_open_a_surface(filled):
-    mesh = repair_mesh(with_a_third_corner_on_an_edge(block(), filled))
+    mesh = repair_mesh(with_a_third_corner_on_an_edge(block(), filled))[0]
     assert is_closed(mesh) and hole_areas_mm2(mesh).sum() == pytest.approx(0, abs=1e-9)
     assert mesh.volume == pytest.approx(240_000)
     assert [remark.severity for remark in check_mesh(mesh)] == ([] if filled else ["fine"])
@@ -244,7 +244,7 @@ def test_slits_do_not_open_a_surface(filled):
 def test_blocks_that_touch_along_an_edge_are_closed():
     other = block()
     other.apply_translation([40.0, 60.0, 0.0])
-    mesh = repair_mesh(block() + other)
+    mesh = repair_mesh(block() + other)[0]
     assert not mesh.is_watertight, "four faces meet at an edge"
     assert is_closed(mesh) and mesh.volume == pytest.approx(480_000) and not len(check_mesh(mesh))
 
@@ -252,8 +252,8 @@ def test_blocks_that_touch_along_an_edge_are_closed():
 def test_a_missing_face_is_a_hole_however_small_the_others():
     mesh = ball(40.0)
     mesh.update_faces(np.arange(len(mesh.faces)) > 3)
-    assert not is_closed(repair_mesh(mesh))
-    (remark,) = check_mesh(repair_mesh(mesh))
+    assert not is_closed(repair_mesh(mesh)[0])
+    (remark,) = check_mesh(repair_mesh(mesh)[0])
     assert (remark.severity, remark.topic) == ("look", "open") and " 0.0 %" not in remark.text
 
 
@@ -361,7 +361,7 @@ def test_a_stated_space_is_told(tmp_path):
 def test_a_spike_is_told():
     mesh = ball(40.0)
     mesh.vertices[7] *= 50
-    (remark,) = check_mesh(repair_mesh(mesh))
+    (remark,) = check_mesh(repair_mesh(mesh)[0])
     assert (remark.severity, remark.topic) == (
         "look",
         "spikes",

@@ -58,7 +58,7 @@ def test_a_body_is_one_closed_outward_surface_about_the_pelvis(age, weight, sex)
     assert mesh.is_watertight
     assert mesh.body_count == 1
     assert mesh.volume > 0
-    assert check_mesh(repair_mesh(mesh)) == ()
+    assert check_mesh(repair_mesh(mesh)[0]) == ()
     low, high = mesh.bounds
     assert low[2] < 0 < high[2]
     assert 0.4 < -low[2] / (high[2] - low[2]) < 0.65
