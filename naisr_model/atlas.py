@@ -59,6 +59,7 @@ from naisr_model.surface.displacements import Displacements, DisplacementTables,
 from naisr_model.surface.fields import distances, effect_field, shape_field, template_field
 from naisr_model.surface.isosurface import isosurface
 from naisr_model.surface.lattice import Lattice
+from naisr_model.surface.material import origins, parts, places
 from naisr_model.surface.sparse import CHUNK, COARSEST, Field, evaluate_band
 from naisr_model.surface.tracking import CodeTracker, FadingTracker, Tracker, make_tracker
 from naisr_model.surface.volume import enclosed_volume
@@ -344,6 +345,49 @@ class Atlas:
             seconds=time.perf_counter() - started,
         )
 
+    def origins_mm(
+        self, points_mm: ArrayLike, covariates: Values, latent: ArrayLike | None = None
+    ) -> NDArray[np.float64]:
+        """The template's points ``[n, 3]`` that points ``[n, 3]`` on a shape belong to.
+
+        Raises:
+            InputError: for an unknown covariate or one out of range, and where the model deforms no template.
+        """
+        model, points = deformable(self._model), self._model.tensor(self.frame.to_model(points_mm))
+        vector, code = self._vector(covariates, False), self._latent(latent)
+        return self.frame.to_mm(origins(model, points, vector, code).numpy(force=True))
+
+    def contributions(
+        self,
+        origins_mm: ArrayLike,
+        covariates: Values,
+        latent: ArrayLike | None = None,
+        start_mm: ArrayLike | None = None,
+    ) -> Contributions:
+        """Where points of the template are in a shape, and what each covariate has to do with that.
+
+        Args:
+            origins_mm: on the template, ``[n, 3]``.
+            covariates: real values by name.
+            latent: code z ``[L]``.
+            start_mm: where the points may be, ``[n, 3]``, for instance as a tracker has them.
+
+        Raises:
+            InputError: for an unknown covariate or one out of range, where a point has no place because the
+                deformation folds, and where the model gives the covariates no displacements of their own.
+        """
+        model, vector, code = additive(self._model), self._vector(covariates, False), self._latent(latent)
+        targets = model.tensor(self.frame.to_model(origins_mm))
+        start = None if start_mm is None else model.tensor(self.frame.to_model(start_mm))
+        found = parts(model, places(model, targets, vector, code, start), vector, code)
+        return Contributions(
+            origins_mm=self.frame.to_mm(targets.numpy(force=True)),
+            points_mm=self.frame.to_mm(found.points.numpy(force=True)),
+            normals=found.normals.numpy(force=True),
+            effects_mm=found.effects.numpy(force=True) * self.frame.scale_mm,
+            person_mm=found.person.numpy(force=True) * self.frame.scale_mm,
+        )
+
     def complete(self, covariates: Values, *, extrapolate: bool = False) -> dict[str, float]:
         """Real values of all covariates; those left out are at the population centre.
 
@@ -396,6 +440,25 @@ class Atlas:
         if not np.isfinite(surface.vertices).all():
             raise InputError("there are no distances at these values; choose others nearer to the data")
         return surface
+
+
+@dataclass(frozen=True, eq=False)
+class Contributions:
+    """How points of the template came to where they are in a shape; the effects and the person's part add up.
+
+    Attributes:
+        origins_mm: the points on the template, ``[n, 3]``.
+        points_mm: the same material points in the shape, ``[n, 3]``.
+        normals: outward unit normals of the shape there, ``[n, 3]``.
+        effects_mm: how far each covariate moves them in everybody, ``[N, n, 3]``.
+        person_mm: how far the code moves them besides, ``[n, 3]``; 0 for the population average.
+    """
+
+    origins_mm: NDArray[np.float64]
+    points_mm: NDArray[np.float64]
+    normals: NDArray[np.float32]
+    effects_mm: NDArray[np.float64]
+    person_mm: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
