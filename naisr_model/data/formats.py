@@ -54,6 +54,7 @@ _MAGIC: tuple[tuple[bytes, str, str], ...] = (
     (b"\xff\xd8\xff", "a picture (JPEG)", "export the surface itself, as STL or PLY"),
     (b"GIF8", "a picture (GIF)", "export the surface itself, as STL or PLY"),
     (b"NRRD000", "an NRRD volume", "name it .nrrd"),
+    (b"ObjectType = Image", "a MetaImage volume", "name it .mha"),
     (b"Kaydara FBX", "an FBX file", "save it as STL, PLY or OBJ"),
     (b"ISO-10303-21", "a STEP file", "save it as STL, PLY or OBJ"),
     (b"\x89HDF", "an HDF5 file", "export the surface as STL or PLY"),

@@ -88,7 +88,7 @@ def read_patient(path: str | Path, label: int | str | None = None) -> PatientSha
     """Read a mesh, a label volume or a cloud of points.
 
     Args:
-        path: STL, PLY, OBJ, VTK, VTP or GLB; NIfTI or NRRD; or text of points (CSV, TXT, XYZ) with
+        path: STL, PLY, OBJ, VTK, VTP or GLB; a label volume; or text of points (CSV, TXT, XYZ) with
             columns x, y, z.
         label: which label of a volume, its number or its name; may be left out where there is only one.
 

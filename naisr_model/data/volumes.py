@@ -1,7 +1,8 @@
 """Label volumes: reading them, choosing one label and turning it into a surface.
 
 The world frame of every result is LPS: x to the patient's left, y to the back, z to the head, in
-millimetres. NIfTI files, which say RAS, and NRRD files of any anatomical space are turned into it.
+millimetres, as MetaImage has it. NIfTI files, which say RAS, and NRRD files of any anatomical space are
+turned into it.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from naisr_model.data.images.reading import is_image, read_image
 from naisr_model.data.remarks import Remark
 from naisr_model.errors import InputError
 
-ENDINGS = (".nii", ".nii.gz", ".nrrd", ".nhdr")
+ENDINGS = (".nii", ".nii.gz", ".nrrd", ".nhdr", ".mha", ".mhd", ".hdr", ".hdr.gz", ".img", ".img.gz")
 """What label volumes are usually called."""
 
 MOST_LABELS = 1000
@@ -88,7 +89,8 @@ def read_labels(path: str | Path) -> LabelVolume:
     """Read a label volume with its orientation.
 
     Args:
-        path: a NIfTI (``.nii``, ``.nii.gz``) or NRRD (``.nrrd``, ``.nhdr``) file under any name.
+        path: NIfTI (``.nii``, ``.nii.gz``), NRRD (``.nrrd``, ``.nhdr``), MetaImage (``.mha``, ``.mhd``) or
+            the pair of NIfTI or Analyze (``.hdr``, ``.img``), under any name.
 
     Raises:
         InputError: when the file is missing, damaged or cut off, when it is not a single

@@ -1,1 +1,1 @@
-"""Three-dimensional images from files: NIfTI and NRRD, told apart by what is in them."""
+"""Three-dimensional images from files: NIfTI, Analyze, NRRD and MetaImage, told apart by what is in them."""

@@ -23,6 +23,14 @@ MOST_BYTES = 1 << 30
 MOST_SHIFT = 0.1
 """Voxels: how far straightening its axes may move one, and two matrices that say the same may differ."""
 
+DIRECTION_DECIMALS = 3
+"""Directions are written with no fewer."""
+
+MOST_ROUNDING = 4e-3
+"""As :func:`_rounding` has it: however few decimals there are, half a degree of shear is none."""
+
+_DECIMALS = 8
+_SINGLE = 2.0**-23
 _BEYOND = 1e12
 _BLOCK = 1 << 20
 _HEADROOM = 1 << 24
@@ -87,8 +95,40 @@ def content(path: Path) -> bytes:
         raise InputError(why_unreadable(path, error)) from error
 
 
+def stored(path: Path) -> bytes:
+    """A whole file of voxels as it is on the disk."""
+    try:
+        with path.open("rb") as file:
+            return file.read(MOST_BYTES + _HEADROOM)
+    except OSError as error:
+        raise InputError(why_unreadable(path, error)) from error
+
+
+def beside(path: Path, told: str) -> Path:
+    """The file that a header says its voxels are in; where it lies is told relative to the header.
+
+    Raises:
+        InputError: when there is none, or there are several.
+    """
+    if "%" in told or told.split()[:1] in (["LIST"], ["list"]):
+        raise InputError(f"{path.name} has its voxels in several files ({told}); save them as one")
+    if not (apart := path.parent / told).is_file():
+        raise InputError(
+            f"{path.name} has its voxels in {told}, which is not there; keep both files together"
+        )
+    return apart
+
+
+def decoded(header: bytes) -> str:
+    """The text of a header."""
+    try:
+        return header.decode("utf-8")
+    except UnicodeDecodeError:
+        return header.decode("latin-1")
+
+
 def unpacked(name: str, file: BinaryIO, encoding: str, most: int) -> bytes:
-    """Up to ``most`` bytes of gzip or bzip2 streams one after another; what follows them is left out.
+    """Up to ``most`` bytes of gzip, zlib or bzip2 streams one after another; what follows is left out.
 
     Raises:
         InputError: when a stream is damaged or cut off.
@@ -105,7 +145,7 @@ def unpacked(name: str, file: BinaryIO, encoding: str, most: int) -> bytes:
 
 def _stream(name: str, file: BinaryIO, packed: bytes, encoding: str, found: bytearray, most: int) -> bytes:
     """Unpack one stream; returns what follows it, as much as was read."""
-    unpacker: Any = zlib.decompressobj(wbits=31) if encoding == "gzip" else bz2.BZ2Decompressor()
+    unpacker: Any = bz2.BZ2Decompressor() if encoding == "bzip2" else zlib.decompressobj(wbits=47)
     while not unpacker.eof and len(found) < most:
         found += unpacker.decompress(packed, min(_BLOCK, most - len(found)))
         rest = getattr(unpacker, "unconsumed_tail", b"")  # bzip2 keeps its own
@@ -157,11 +197,11 @@ def cut_off(name: str, announced: int, found: int) -> InputError:
 
 def squared(
     name: str, to_lps_mm: NDArray[np.float64], matrix: NDArray[np.float64], counts: Sequence[int]
-) -> NDArray[np.float64]:
+) -> tuple[NDArray[np.float64], tuple[Remark, ...]]:
     """Voxel indices to LPS millimetres with axes at right angles, the middle of the image where it was.
 
     Headers round directions; the nearest orthogonal axes (polar decomposition) are what was meant, unless
-    they move a voxel by more than :data:`MOST_SHIFT`.
+    they move a voxel by more than :data:`MOST_SHIFT` and by more than rounding explains.
 
     Args:
         name: of the file.
@@ -169,23 +209,61 @@ def squared(
         matrix: 4x4, voxel indices to the file's world.
         counts: voxels along each index axis.
 
+    Returns:
+        The matrix, 4x4, and a remark where rounding moves a voxel by more than that.
+
     Raises:
         InputError: when a number is not finite, an axis has no length or the axes are sheared.
     """
     if not (np.abs(matrix) < _BEYOND).all():  # nor NaN
         raise InputError(f"{name} has axes that are not finite numbers; export it again")
-    matrix = to_lps_mm @ matrix
+    written, matrix = matrix[:3, :3], to_lps_mm @ matrix
     steps = np.linalg.norm(matrix[:3, :3], axis=0)
     if (steps < 1 / _BEYOND).any():
-        size = " x ".join(f"{step:g}" for step in steps)
-        raise InputError(f"{name} has voxels of {size} mm; set the spacing and export it again")
-    left, _, right = np.linalg.svd(matrix[:3, :3] / steps)
+        raise unspaced(name, steps)
+    directions = matrix[:3, :3] / steps
+    left, _, right = np.linalg.svd(directions)
     straight, middle = matrix.copy(), (np.array(counts) - 1) / 2
     straight[:3, :3] = left @ right * steps
     straight[:3, 3] += (matrix - straight)[:3, :3] @ middle
-    if shift(straight, matrix, counts) > MOST_SHIFT:
+    if shift(straight, matrix, counts) <= MOST_SHIFT:
+        return straight, ()
+    if np.linalg.norm(directions - left @ right) > _rounding(written):
         raise InputError(f"the axes of {name} are not at right angles; resample it onto a rectangular grid")
-    return straight
+    most_mm = np.linalg.norm(apart(straight, matrix, counts), axis=0).max()
+    sentence = (
+        f"the file gives its axes rounded: they were straightened, which moves corners by {most_mm:.2g} mm"
+    )
+    return straight, (Remark("fine", "axes", sentence),)
+
+
+def _rounding(written: NDArray[np.float64]) -> float:
+    """How far rounded axes may be from being orthogonal, as the Frobenius norm of unit vectors.
+
+    What rounding by E adds to a rotation R is R sym(R'E) beside a turn, which is no longer than E, whose
+    entries are at most half a unit of the last decimal. What was rounded are the directions, or their
+    products with the spacing.
+
+    Args:
+        written: the axes in columns as the file has them, ``[3, 3]``.
+    """
+    unit = 10.0 ** -_decimals(written)
+    products = unit / 2 * float(np.sqrt((3 / np.square(written).sum(axis=0)).sum()))
+    return max(1.5 * 10.0**-DIRECTION_DECIMALS, min(products, MOST_ROUNDING))
+
+
+def _decimals(numbers: NDArray[np.float64]) -> int:
+    """With how many decimals numbers are written, which may have gone through single precision."""
+    for decimals in range(_DECIMALS):
+        if (np.abs(numbers - numbers.round(decimals)) <= _SINGLE * np.abs(numbers)).all():
+            return decimals
+    return _DECIMALS
+
+
+def unspaced(name: str, steps: NDArray[np.floating]) -> InputError:
+    """Of voxels whose size is no length."""
+    size = " x ".join(f"{step:g}" for step in steps)
+    return InputError(f"{name} has voxels of {size} mm; set the spacing and export it again")
 
 
 def shift(one: NDArray[np.float64], other: NDArray[np.float64], counts: Sequence[int]) -> float:
@@ -216,3 +294,9 @@ def unplaced() -> Remark:
         "the file does not say how the patient lies",
         "do not rely on left and right",
     )
+
+
+def unlocated() -> Remark:
+    """For a file that names no origin."""
+    sentence = "the file does not say where the image lies, so its first voxel is taken to be at 0"
+    return Remark("look", "origin", sentence, "align it to the atlas")

@@ -1,4 +1,4 @@
-"""NIfTI-1 and NIfTI-2 in one file, ``.nii`` or ``.nii.gz``: headers by nibabel, judged here.
+"""NIfTI-1 and NIfTI-2 in one file or a pair of header and image, and Analyze: read by nibabel, judged here.
 
 nibabel would repair odd headers and say so on stderr; what is wrong with one is for the user to know.
 """
@@ -6,7 +6,9 @@ nibabel would repair odd headers and say so on stderr; what is wrong with one is
 from __future__ import annotations
 
 import math
-from typing import Any
+import re
+from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +17,7 @@ from naisr_model.data.images.base import (
     MOST_SHIFT,
     Image,
     apart,
+    content,
     cut_off,
     require_one_value,
     require_size,
@@ -23,6 +26,7 @@ from naisr_model.data.images.base import (
     squared,
     surplus,
     unplaced,
+    unspaced,
 )
 from naisr_model.data.remarks import Remark
 from naisr_model.errors import InputError
@@ -44,29 +48,67 @@ def read_nifti(name: str, content: bytes) -> Image:
     Raises:
         InputError: when the file is damaged or cut off, or is no single volume of numbers.
     """
-    header = _header(name, content)
+    from nibabel.nifti1 import Nifti1Header
+    from nibabel.nifti2 import Nifti2Header
+
+    header = _header(name, content, Nifti1Header if content[344:347] == b"n+1" else Nifti2Header)
+    return _image(name, header, name, content, len(header.binaryblock) + 4)
+
+
+def read_pair(path: Path, content_of_header: bytes) -> Image:
+    """Read an image that lies beside its header; Analyze says nothing of how the patient lies.
+
+    Args:
+        path: of the header.
+        content_of_header: the whole of it, unpacked.
+
+    Raises:
+        InputError: as :func:`read_nifti`, and when the image is not there.
+    """
+    from nibabel.nifti1 import Nifti1PairHeader
+    from nibabel.nifti2 import Nifti2PairHeader
+    from nibabel.spm2analyze import Spm2AnalyzeHeader
+
+    start = content_of_header[:348]
+    second = Nifti2PairHeader if start[4:7] == b"ni2" else Spm2AnalyzeHeader
+    header = _header(path.name, content_of_header, Nifti1PairHeader if start[344:347] == b"ni1" else second)
+    image = half(path, "img")
+    if image is None:
+        raise InputError(
+            f"{path.name} is the header of a pair, and its image (.img) is not there; keep both together"
+        )
+    return _image(path.name, header, image.name, content(image), 0)
+
+
+def half(path: Path, other: Literal["hdr", "img"]) -> Path | None:
+    """The other file of a pair, which has the same name but for the ending."""
+    stem = re.sub(r"\.\w+(\.gz)?$", "", path.name, flags=re.IGNORECASE)
+    names = (f"{stem}.{ending}{gz}" for gz in ("", ".gz", ".GZ") for ending in (other, other.upper()))
+    return next((half for name in names if (half := path.with_name(name)) != path and half.is_file()), None)
+
+
+def _image(name: str, header: Any, name_of_voxels: str, content: bytes, least: int) -> Image:
+    """What a header says of voxels that begin at ``least`` or later."""
     counts, dtype = _counts(name, header), _dtype(name, header)
     require_size(name, counts, dtype.itemsize)
     require_one_value(name, math.prod(counts[3:]))
     require_volume(name, counts)
     counts = counts[:3]
     slope, intercept = _scale(name, header)
-    voxels, left = _voxels(name, content, header, counts, dtype)
+    first = max(_offset(name, header), least)
+    voxels, left = _voxels(name_of_voxels, memoryview(content)[first:], counts, dtype)
     ras = _matrix(name, header)
     unit_mm = _stated_mm(header)
-    lps_mm = squared(name, _in_mm(unit_mm) @ RAS_TO_LPS, ras, counts)
-    placed = (*_position_remarks(header, ras, counts), *_spacing_remarks(header, ras))
+    lps_mm, squared_remarks = squared(name, _in_mm(unit_mm) @ RAS_TO_LPS, ras, counts)
+    placed = (*_position_remarks(header, ras, counts), *_spacing_remarks(header, ras), *squared_remarks)
     return Image(voxels[None], lps_mm, {}, (*placed, *surplus(left)), slope, intercept, unit_mm)
 
 
-def _header(name: str, content: bytes) -> Any:
-    import nibabel
-
-    kinds = {348: nibabel.Nifti1Header, 540: nibabel.Nifti2Header}
-    size = 348 if content[344:347] == b"n+1" else 540
+def _header(name: str, content: bytes, kind: Any) -> Any:
+    size = kind.template_dtype.itemsize
     if len(content) < size:
         raise InputError(f"{name} is cut off; copy or export it again")
-    return kinds[size](content[:size], check=False)
+    return kind(content[:size], check=False)
 
 
 def _counts(name: str, header: Any) -> list[int]:
@@ -101,18 +143,20 @@ def _scale(name: str, header: Any) -> tuple[float, float]:
     return (1.0, 0.0) if slope is None else (slope, intercept)
 
 
-def _voxels(
-    name: str, content: bytes, header: Any, counts: list[int], dtype: np.dtype
-) -> tuple[NDArray[Any], int]:
-    """The voxels, and how many bytes follow them."""
-    first, least = float(header["vox_offset"]), len(header.binaryblock) + 4
+def _offset(name: str, header: Any) -> int:
+    first = float(header["vox_offset"])
     if not 0 <= first < math.inf:
         raise InputError(f"{name} does not say where its voxels begin; it is damaged, export it again")
-    offset, count = max(int(first), least), math.prod(counts)
-    left = len(content) - offset - count * dtype.itemsize
+    return int(first)
+
+
+def _voxels(name: str, content: memoryview, counts: list[int], dtype: np.dtype) -> tuple[NDArray[Any], int]:
+    """The voxels, and how many bytes follow them."""
+    count = math.prod(counts)
+    left = len(content) - count * dtype.itemsize
     if left < 0:
-        raise cut_off(name, count * dtype.itemsize, len(content) - offset)
-    return np.frombuffer(content, dtype, count, offset).reshape(counts, order="F"), left
+        raise cut_off(name, count * dtype.itemsize, len(content))
+    return np.frombuffer(content, dtype, count).reshape(counts, order="F"), left
 
 
 def _matrix(name: str, header: Any) -> NDArray[np.float64]:
@@ -121,10 +165,9 @@ def _matrix(name: str, header: Any) -> NDArray[np.float64]:
         return np.asarray(header.get_sform(), np.float64)
     spacing = header["pixdim"][1:4]
     if not (np.isfinite(spacing) & (spacing > 0)).all():
-        size = " x ".join(f"{step:g}" for step in spacing)
-        raise InputError(f"{name} has voxels of {size} mm; set the spacing and export it again")
+        raise unspaced(name, spacing)
     if not _is_coded(header, "qform"):
-        return np.asarray(header.get_base_affine(), np.float64)
+        return np.asarray(header.get_best_affine(), np.float64)
     matrix = _qform(header)
     if matrix is None:
         raise InputError(f"{name} has a damaged orientation (qform); set it and export it again")
@@ -132,7 +175,7 @@ def _matrix(name: str, header: Any) -> NDArray[np.float64]:
 
 
 def _is_coded(header: Any, form: str) -> bool:
-    return bool(header[f"{form}_code"] != 0)
+    return bool(header.get(f"{form}_code", 0) != 0)
 
 
 def _qform(header: Any) -> NDArray[np.float64] | None:
@@ -148,7 +191,7 @@ def _qform(header: Any) -> NDArray[np.float64] | None:
 
 
 def _stated_mm(header: Any) -> float | None:
-    return UNITS_MM.get(int(header["xyzt_units"]) & 7)
+    return UNITS_MM.get(int(header.get("xyzt_units", 0)) & 7)
 
 
 def _in_mm(unit_mm: float | None) -> NDArray[np.float64]:

@@ -15,18 +15,21 @@ from numpy.typing import NDArray
 from naisr_model.data.images.base import (
     MOST_BYTES,
     Image,
+    beside,
     cut_off,
+    decoded,
     require_one_value,
     require_size,
     require_volume,
     squared,
+    stored,
     surplus,
+    unlocated,
     unpacked,
     unplaced,
 )
 from naisr_model.data.remarks import Remark
 from naisr_model.errors import InputError
-from naisr_model.files import why_unreadable
 
 SIGNS_TO_LPS = {
     "left-posterior-superior": (1, 1, 1),
@@ -109,9 +112,9 @@ def read_nrrd(path: Path, content: bytes) -> Image:
     matrix[:3, :3] = directions[spatial].T
     matrix[:3, 3], origin_remarks = _origin(header)
     unit_mm = _stated_mm(path.name, header)
-    lps_mm = squared(path.name, _to_lps_mm(header, unit_mm or 1.0), matrix, size)
+    lps_mm, squared_remarks = squared(path.name, _to_lps_mm(header, unit_mm or 1.0), matrix, size)
     unknown = () if is_placed and _word(header, "space") in SIGNS_TO_LPS else (unplaced(),)
-    remarks = (*unknown, *origin_remarks, *surplus(left))
+    remarks = (*unknown, *origin_remarks, *squared_remarks, *surplus(left))
     return Image(voxels, lps_mm, metadata, remarks, unit_mm=unit_mm)
 
 
@@ -119,7 +122,7 @@ def _header(name: str, content: bytes) -> tuple[dict[str, Any], dict[str, str]]:
     """The fields that matter, and the key/value pairs."""
     import nrrd
 
-    magic, *lines = re.split(r"\r?\n", _decoded(content))
+    magic, *lines = re.split(r"\r?\n", decoded(content))
     pairs = [line.split(":=", 1) for line in lines if re.match(r"[^:#]+:=", line)]
     fields = [_field(line) for line in lines if re.match(r"[^:#]+:(?!=)", line)]
     kept = [line for line in fields if line.split(":")[0] in FIELDS]
@@ -149,13 +152,6 @@ def _is_parsed(lines: Sequence[str]) -> bool:
     except (nrrd.NRRDError, *_DAMAGED):
         return False
     return True
-
-
-def _decoded(content: bytes) -> str:
-    try:
-        return content.decode("utf-8")
-    except UnicodeDecodeError:
-        return content.decode("latin-1")
 
 
 def _field(line: str) -> str:
@@ -231,8 +227,7 @@ def _origin(header: Mapping[str, Any]) -> tuple[NDArray[np.float64], tuple[Remar
     origin = np.asarray(header.get("space origin", ()), np.float64)
     if origin.shape == (3,) and np.isfinite(origin).all():
         return origin, ()
-    sentence = "the file does not say where the image lies, so its first voxel is taken to be at 0"
-    return np.zeros(3), (Remark("look", "origin", sentence, "align it to the atlas"),)
+    return np.zeros(3), (unlocated(),)
 
 
 def _to_lps_mm(header: Mapping[str, Any], unit_mm: float) -> NDArray[np.float64]:
@@ -341,15 +336,5 @@ def _apart(path: Path, header: Mapping[str, Any], data: bytes) -> tuple[str, byt
     told = str(header.get("data file", ""))
     if not told:
         return path.name, data
-    if "%" in told or told.split()[0].upper() == "LIST":
-        raise InputError(f"{path.name} has its voxels in several files ({told}); save them as one")
-    apart = path.parent / told
-    if not apart.is_file():
-        raise InputError(
-            f"{path.name} has its voxels in {told}, which is not there; keep both files together"
-        )
-    try:
-        with apart.open("rb") as file:
-            return apart.name, file.read(MOST_BYTES + MOST_NUMBERS)
-    except OSError as error:
-        raise InputError(why_unreadable(apart, error)) from error
+    apart = beside(path, told)
+    return apart.name, stored(apart)

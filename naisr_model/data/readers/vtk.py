@@ -39,7 +39,7 @@ _TYPES = C_TYPES | {
 }
 _CELLS = ("VERTICES", "LINES", "POLYGONS", "TRIANGLE_STRIPS", "CELLS")
 _GRIDS = ("STRUCTURED_POINTS", "RECTILINEAR_GRID")
-_GRID = "holds a grid of voxels; give a surface, or labels as NIfTI or NRRD"
+_GRID = "holds a grid of voxels; give a surface, or labels as NIfTI, NRRD or MetaImage"
 _NEXT_WORD = re.compile(rb"\n[ \t]*[A-Za-z_]{3,}")
 
 

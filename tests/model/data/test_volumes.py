@@ -89,6 +89,23 @@ def nrrd(voxels, matrix, space="space: left-posterior-superior", extra="") -> by
     return ("\n".join(lines) + f"\n{extra}\n").encode() + voxels.tobytes(order="F")
 
 
+def metaimage(voxels, matrix) -> bytes:
+    steps = np.linalg.norm(matrix[:3, :3], axis=0)
+    kinds = {"uint8": "MET_UCHAR", "int16": "MET_SHORT", "float32": "MET_FLOAT"}
+    lines = (
+        "ObjectType = Image",
+        "NDims = 3",
+        "BinaryData = True",
+        "TransformMatrix = " + " ".join(map(str, (matrix[:3, :3] / steps).T.ravel())),
+        "Offset = " + " ".join(map(str, matrix[:3, 3])),
+        "ElementSpacing = " + " ".join(map(str, steps)),
+        "DimSize = " + " ".join(map(str, voxels.shape)),
+        f"ElementType = {kinds[voxels.dtype.name]}",
+        "ElementDataFile = LOCAL\n",
+    )
+    return "\n".join(lines).encode() + voxels.tobytes(order="F")
+
+
 def write(path, content: bytes):
     path.write_bytes(gzip.compress(content, 1) if path.suffix == ".gz" else content)
     return path
@@ -99,6 +116,7 @@ KINDS = {
     "a.nii.gz": lambda voxels, matrix: nifti(voxels, RAS @ matrix),
     "metres.nii": lambda voxels, matrix: nifti(voxels, np.diag([1e-3] * 3 + [1]) @ RAS @ matrix, unit=1),
     "lps.nrrd": nrrd,
+    "lps.mha": metaimage,
     "ras.nrrd": lambda voxels, matrix: nrrd(voxels, RAS @ matrix, "space: right-anterior-superior"),
     "las.nrrd": lambda voxels, matrix: nrrd(voxels, np.diag([-1.0, 1, 1, 1]) @ RAS @ matrix, "space: LAS"),
 }

@@ -499,9 +499,6 @@ def test_where_voxels_begin_is_looked_at(tmp_path, offset):
 # --- what is no image ---------------------------------------------------------------------------
 
 OTHER = {
-    "a.hdr": (bytes(344) + b"ni1\0", "one half of a pair of header and image; save it as one file"),
-    "a.mha": (b"ObjectType = Image\nNDims = 3\n", "a MetaImage; save it as NIfTI or NRRD"),
-    "a.mhd": (b"NDims = 3\nDimSize = 3 3 3\n", "a MetaImage; save it as NIfTI or NRRD"),
     "a.dcm": (bytes(128) + b"DICM", "a DICOM file; convert the series"),
 }
 
@@ -519,8 +516,12 @@ def test_what_is_no_image_is_told_apart(tmp_path):
     for name, content, match in (
         ("zip.nii", b"PK\x03\x04rest", "a zip archive; unpack it"),
         ("page.nii.gz", b"<!DOCTYPE html><html>", "a web page; download the file itself"),
-        ("mesh.nrrd", b"solid a\nfacet normal 0 0 1\n", "holds neither NIfTI nor NRRD"),
-        ("triangles.nii", bytes(80) + struct.pack("<I", 9) * 40, "holds neither NIfTI nor NRRD"),
+        ("mesh.nrrd", b"solid a\nfacet normal 0 0 1\n", "holds no NIfTI, Analyze, NRRD or MetaImage"),
+        (
+            "triangles.nii",
+            bytes(80) + struct.pack("<I", 9) * 40,
+            "holds no NIfTI, Analyze, NRRD or MetaImage",
+        ),
         ("empty.nii", b"", "is empty"),
     ):
         (tmp_path / name).write_bytes(content)
