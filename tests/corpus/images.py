@@ -1,9 +1,10 @@
-"""The egg as a label volume in NIfTI and NRRD; written here and not by a library."""
+"""The egg as a label volume in NIfTI, NRRD and MetaImage; written here and not by a library."""
 
 from __future__ import annotations
 
 import gzip
 import struct
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -217,6 +218,70 @@ def nrrd(
     told |= {name.replace("_", " "): value for name, value in fields.items()}
     lines = ["NRRD0005", *(f"{name}: {value}" for name, value in told.items() if name not in drop)]
     return (end.join(lines) + 2 * end).encode() + _packed(voxels, encoding, order)
+
+
+def pair(voxels: NDArray | None = None, **header: Any) -> dict[str, bytes]:
+    """The same egg as a NIfTI header and its image beside it."""
+    whole = Nifti(**{"magic": b"ni1\0"} | header).file(labels() if voxels is None else voxels)
+    size = 348 if header.get("version", 1) == 1 else 540
+    start = bytearray(whole[:size])
+    at = slice(108, 112) if size == 348 else slice(168, 176)
+    start[at] = bytes(at.stop - at.start)  # the image begins with its voxels
+    return {"egg.hdr": bytes(start), "egg.img": whole[size + 4 :]}
+
+
+def analyze(voxels: NDArray | None = None) -> dict[str, bytes]:
+    """The same as Analyze, which has no magic and no place."""
+    files = pair(voxels, sform=None)
+    return files | {"egg.hdr": files["egg.hdr"][:252] + bytes(96)}
+
+
+_METAIMAGE_TYPES = {
+    "u1": "UCHAR",
+    "i1": "CHAR",
+    "u2": "USHORT",
+    "i2": "SHORT",
+    "u4": "UINT",
+    "i4": "INT",
+    "u8": "ULONG_LONG",
+    "i8": "LONG_LONG",
+    "f4": "FLOAT",
+    "f8": "DOUBLE",
+}
+
+
+def metaimage(
+    voxels: NDArray | None = None,
+    *,
+    packed: bool = False,
+    order: Order = "<",
+    drop: Sequence[str] = (),
+    end: str = "\n",
+    file: str = "LOCAL",
+    **fields: object,
+) -> bytes:
+    """A MetaImage; ``fields`` are more or other lines. Voxels in another ``file`` are left out."""
+    voxels = labels() if voxels is None else voxels
+    matrix = np.diag([-1.0, -1.0, 1.0, 1.0]) @ placed()
+    axes = matrix[:3, :3] / np.linalg.norm(matrix[:3, :3], axis=0)
+    told: dict[str, object] = {
+        "ObjectType": "Image",
+        "NDims": voxels.ndim,
+        "BinaryData": True,
+        "BinaryDataByteOrderMSB": order == ">",
+        "CompressedData": packed,
+        "TransformMatrix": " ".join(f"{x:.9g}" for x in axes.T.ravel()),
+        "Offset": " ".join(f"{x:.9g}" for x in matrix[:3, 3]),
+        "CenterOfRotation": "0 0 0",
+        "AnatomicalOrientation": "RAI",
+        "ElementSpacing": " ".join(f"{x:g}" for x in SPACING_MM),
+        "DimSize": " ".join(map(str, voxels.shape)),
+        "ElementType": f"MET_{_METAIMAGE_TYPES[voxels.dtype.str[1:]]}",
+    }
+    told = told | fields | {"ElementDataFile": file}
+    lines = end.join(f"{name} = {value}" for name, value in told.items() if name not in drop) + end
+    body = _packed(voxels, "raw", order) if file == "LOCAL" else b""
+    return lines.encode() + (zlib.compress(body) if packed else body)
 
 
 def _packed(voxels: NDArray, encoding: str, order: Order) -> bytes:

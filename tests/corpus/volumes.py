@@ -3,26 +3,32 @@
 from __future__ import annotations
 
 import gzip
+from collections.abc import Callable, Mapping
 from functools import partial
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from corpus import damage
-from corpus.case import REFUSED, Case, Damage, Expected, Special
-from corpus.fits import case, special, whole
+from corpus.case import REFUSED, Case, Damage, Expected, Files, Goods, Special
+from corpus.fits import case, fitting, special, whole
 from corpus.images import (
     SPACING_MM,
     VOLUME,
+    analyze,
     labels,
+    metaimage,
     nifti,
     nifti_gz,
     nrrd,
+    pair,
     placed,
     segment,
     slicer,
     turned,
     two_labels,
 )
+from numpy.random import Generator
 from numpy.typing import NDArray
 
 KIND = "volume"
@@ -30,7 +36,14 @@ _volume = partial(case, KIND)
 GOOD = whole(VOLUME)
 EITHER = whole(VOLUME, "either")
 BOX = whole(float(labels().size * np.prod(SPACING_MM)) / 1000, "either")
-FORMS = {"nii": nifti, "nii.gz": nifti_gz, "nrrd": nrrd, "packed.nrrd": partial(nrrd, encoding="gzip")}
+FORMS = {
+    "nii": nifti,
+    "nii.gz": nifti_gz,
+    "nrrd": nrrd,
+    "packed.nrrd": partial(nrrd, encoding="gzip"),
+    "mha": metaimage,
+    "packed.mha": partial(metaimage, packed=True),
+}
 _KINDS = ("u1", "i1", "u2", "i2", "u4", "i4", "u8", "i8", "f4", "f8")
 
 
@@ -48,6 +61,45 @@ def _nrrd(
     name: str, expected: Expected = GOOD, *damages: Damage, words: tuple[str, ...] = (), **header: Any
 ) -> Case:
     return _volume(f"nrrd: {name}", "egg.nrrd", partial(nrrd, **header), expected, *damages, words=words)
+
+
+def _mha(
+    name: str, expected: Expected = GOOD, *damages: Damage, words: tuple[str, ...] = (), **header: Any
+) -> Case:
+    return _volume(f"mha: {name}", "egg.mha", partial(metaimage, **header), expected, *damages, words=words)
+
+
+def _two(
+    name: str,
+    files: Callable[[], Files],
+    expected: Expected = GOOD,
+    opened: str = "egg.hdr",
+    damages: Mapping[str, Damage] = MappingProxyType({}),
+) -> Case:
+    """Two files that belong together, some of them damaged; of which one is opened."""
+
+    def make(_goods: Goods, rng: Generator) -> Files:
+        made = dict(files())
+        for file, harm in damages.items():
+            good = made[file]
+            assert isinstance(good, bytes)
+            made[file] = harm(good, rng)
+        return made
+
+    return Case(KIND, f"two files: {name}", make, fitting(opened), expected)
+
+
+def _apart(file: str = "egg.raw", **header: Any) -> Files:
+    """A header of MetaImage, and its voxels beside it."""
+    return {"egg.mhd": metaimage(file=file, **header), "egg.raw": labels().tobytes(order="F")}
+
+
+def _second_pair() -> Files:
+    return pair(version=2, magic=b"ni2\0\r\n\x1a\n")
+
+
+def _without(files: Callable[[], Files], lost: str) -> Files:
+    return {name: content for name, content in files().items() if name != lost}
 
 
 def _noisy(kind: str, value: float, size: float) -> NDArray:
@@ -325,6 +377,75 @@ _SIZES = [
     _nrrd("no byte order", EITHER, drop=("endian",), voxels=labels(1, "u2")),
     _nrrd("skipped bytes", EITHER, byte_skip=-1),
 ]
+_METAIMAGES = [
+    *(_mha(f"of {kind}", voxels=labels(1, kind)) for kind in _KINDS),
+    *(_mha(f"of {kind}, big endian", voxels=labels(3, kind), order=">") for kind in ("i2", "f4")),
+    _mha("lines of Windows", end="\r\n"),
+    _mha("two labels and one named", voxels=two_labels(), words=("--label", "2")),
+    _mha("two labels", REFUSED, voxels=two_labels()),
+    _mha("a map of probabilities", REFUSED, voxels=_noisy("f4", 0.7, 0.3)),
+    _mha("three values a voxel", REFUSED, ElementNumberOfChannels=3),
+    _mha("two dimensions", REFUSED, voxels=labels()[:, :, 16]),
+    _mha("units of cm", REFUSED, DistanceUnits="cm"),
+    _mha("sheared", REFUSED, TransformMatrix="1 0 0 0.17 0.985 0 0 0 1"),
+    _mha("rounded", TransformMatrix="-1 0.012 0 -0.013 -1 0 0 0 1"),
+    *(_mha(f"no {field}", EITHER, drop=(field,)) for field in ("TransformMatrix", "Offset", "ObjectType")),
+    *(
+        _mha(f"no {field}", REFUSED, drop=(field,))
+        for field in ("NDims", "DimSize", "ElementType", "ElementSpacing", "ElementDataFile")
+    ),
+    *(
+        _mha(f"{field} {value}", REFUSED, **_told(field, value))
+        for field, value in (
+            *(("NDims", 0), ("NDims", 4), ("NDims", "x"), ("DimSize", "30000 30000 30000")),
+            *(
+                ("DimSize", "0 35 33"),
+                ("DimSize", "-37 35 33"),
+                ("DimSize", "38 35 33"),
+                ("DimSize", "a b c"),
+            ),
+            *(("ElementSpacing", "0 1 1"), ("ElementSpacing", "nan 1 1"), ("ElementSpacing", "1,5 1,5 2,5")),
+            *(("ElementType", "MET_STRING"), ("BinaryData", False), ("ObjectType", "Tube")),
+            *(("TransformMatrix", "0 0 0 0 0 0 0 0 0"), ("TransformMatrix", "1 0 0"), ("Offset", "inf 0 0")),
+        )
+    ),
+    *(
+        _mha(f"voxels in {file}", REFUSED, file=file)
+        for file in ("gone.raw", "/etc/passwd", "LIST", "a%03d.raw 1 33 1", ".", "egg.mha")
+    ),
+    _two("mhd and raw", _apart, opened="egg.mhd"),
+    _two("mhd and raw after a header", partial(_apart, HeaderSize=-1), opened="egg.mhd"),
+    _two("mhd and raw after more than there is", partial(_apart, HeaderSize=99999), REFUSED, "egg.mhd"),
+    _two("mhd and half a raw", _apart, REFUSED, "egg.mhd", {"egg.raw": damage.cut(0.5)}),
+    _two("the raw of an mhd", _apart, REFUSED, "egg.raw"),
+]
+_PAIRS = [
+    *(
+        _two(f"{kind} by its {opened}", files, opened=f"egg.{opened}")
+        for kind, files in (("a pair", pair), ("a second pair", _second_pair), ("analyze", analyze))
+        for opened in ("hdr", "img")
+    ),
+    _two("a pair, big endian", partial(pair, labels(3, "i2"), order=">")),
+    _two("a pair turned", partial(pair, sform=placed(turn=turned(20)))),
+    *(
+        _two(f"{kind} without its {lost}", partial(_without, files, lost), REFUSED, opened)
+        for kind, files in (("a pair", pair), ("analyze", analyze))
+        for lost, opened in (("egg.img", "egg.hdr"), ("egg.hdr", "egg.img"))
+    ),
+    *(
+        _two(f"{kind}, the {file} {what}", files, expected, damages={file: harm})
+        for kind, files in (("a pair", pair), ("analyze", analyze))
+        for file, what, harm, expected in (
+            ("egg.hdr", "cut", damage.cut(0.5), REFUSED),
+            ("egg.img", "cut", damage.cut(0.5), REFUSED),
+            ("egg.img", "short", damage.short(1), REFUSED),
+            ("egg.img", "packed", damage.gzipped, GOOD),
+            ("egg.img", "longer", damage.ended_with(bytes(99)), GOOD),
+            ("egg.hdr", "random", damage.noise(0, 348), REFUSED),
+            ("egg.hdr", "with flips", damage.flip(3, 40, 348), EITHER),
+        )
+    ),
+]
 _BROKEN = [
     *(
         _volume(f"{form} cut at {share}", _file(form), good, REFUSED, damage.cut(share))
@@ -349,7 +470,7 @@ _BROKEN = [
             EITHER,
             damage.flip(2, 0, 340),
         )
-        for form in ("nii", "nrrd")
+        for form in ("nii", "nrrd", "mha")
         for turn in "abcdef"
     ),
     *(
@@ -380,4 +501,4 @@ _BROKEN = [
     _volume("a header of 540 bytes alone", "egg.nii", lambda: nifti(version=2)[:540], REFUSED),
     _volume("nii goes on as nrrd", "egg.nii", nifti, EITHER, damage.joined(nrrd())),
 ]
-CASES = (*_WRITTEN, *_VALUES, *_NAMED, *_LAYERED, *_PLACES, *_SIZES, *_BROKEN)
+CASES = (*_WRITTEN, *_VALUES, *_NAMED, *_LAYERED, *_PLACES, *_SIZES, *_METAIMAGES, *_PAIRS, *_BROKEN)
