@@ -43,6 +43,7 @@ def prepare(
     held_out: float = 0.2,
     seed: int = 0,
     workers: int | None = None,
+    accept: list[int] | None = None,
 ) -> None:
     """Turn a CSV of meshes and covariates into a store of samples to train on.
 
@@ -60,6 +61,8 @@ def prepare(
         held_out: share of the subjects kept for evaluation.
         seed: of the split and of the samples.
         workers: processes; left out, one a core.
+        accept: a row, the header being 1, that you have looked at and that is right, as a true 999 or the
+            mesh of a twin; it is not left out for being unlike the others. For several rows give it again.
     """
     from naisr_model.data.prepare import PrepareOptions, require_possible
     from naisr_model.data.prepare import prepare as run
@@ -67,9 +70,10 @@ def prepare(
 
     if out is None and not check:
         raise InputError("give the folder of the store, --out FOLDER, or --check to look at the table alone")
-    options = PrepareOptions(surface_samples, near_samples, uniform_samples, held_out, seed, workers)
+    counts, accepted = (surface_samples, near_samples, uniform_samples), tuple(accept or ())
+    options = PrepareOptions(*counts, held_out, seed, workers, accepted)
     require_possible(options)
-    read = read_table(table)
+    read = read_table(table, accepted)
     for line in (*read.summary, *(f"{one.severity}: {one.text}" for one in gravest_first(read.remarks))):
         print(line, flush=True)
     if check or out is None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -33,6 +33,10 @@ SPELLINGS = (
 
 MISSING_CODES = (-1, -9, -77, -88, -99, -999, -9999, 9, 77, 88, 99, 777, 888, 999, 7777, 8888, 9999, 99999)
 """Numbers that questionnaires and databases write for a value that nobody knows."""
+
+SURELY_BELOW, SURELY_TIMES = -9, 3.0
+"""Such a number is almost surely a code where all others are positive: up to the first, or beyond so many
+times the largest of them."""
 
 USUAL_PAIRS = ((0.0, 1.0), (1.0, 2.0), (-1.0, 1.0))
 """Pairs of numbers that are codes for two levels and hardly ever measurements."""
@@ -71,6 +75,11 @@ class Column:
     rows: tuple[int, ...]
     cells: tuple[str, ...]
 
+    def take(self, chosen: NDArray[np.bool_]) -> Column:
+        """The column with only some of its rows."""
+        rows, cells = (tuple(np.array(each)[chosen].tolist()) for each in (self.rows, self.cells))
+        return replace(self, rows=rows, cells=cells)
+
 
 @dataclass(frozen=True, eq=False)
 class Understood:
@@ -78,10 +87,11 @@ class Understood:
 
     Attributes:
         covariate: centre and scale are still 0 and 1.
-        values: real units, -1/+1 of a binary covariate, ``[n]``; NaN in cells with a fault.
+        values: real units, -1/+1 of a binary covariate, ``[n]``; NaN in cells with a fault or a code.
         faults: what cannot be used.
         remarks: what looks wrong, or was taken as the same.
         told: what it was taken for, as ``age [months]: a number from 1 to 233``.
+        codes: by row what is almost surely a code for a missing value, and refuses the row.
     """
 
     covariate: Covariate
@@ -89,17 +99,43 @@ class Understood:
     faults: tuple[Fault, ...]
     remarks: tuple[Remark, ...]
     told: str
+    codes: Mapping[int, Remark] = field(default_factory=dict)
 
 
-def read_column(column: Column, sheet_marks: Collection[str]) -> Understood:
+def read_column(
+    column: Column, sheet_marks: Collection[str], accepted: Collection[int] = frozenset()
+) -> Understood:
     """Understand a covariate.
 
     Args:
         column: its cells.
         sheet_marks: the decimal marks in the whole table, for a column whose own do not tell.
+        accepted: rows whose value is meant, even where it looks like a code for a missing one.
     """
     marks = decimal_marks(column.cells) or sheet_marks
-    numbers = [_number_or_nan(cell, marks) for cell in column.cells]
+    values = np.array([_number_or_nan(cell, marks) for cell in column.cells])
+    codes = [] if column.settings.keys() & {"levels"} else _sure_codes(values[~np.isnan(values)])
+    coded = np.isin(values, codes) & ~np.isin(column.rows, list(accepted))
+    if not coded.any():
+        return _understood(column, marks, values.tolist())
+    understood = _understood(column.take(~coded), marks, values[~coded].tolist())
+    others = _range(values[~np.isnan(values) & ~np.isin(values, codes)])
+    all_values = np.full(len(values), math.nan)
+    all_values[~coded] = understood.values
+    told = [_coded(column, coded & (values == code), code, others) for code in codes]
+    return replace(
+        understood,
+        values=all_values,
+        remarks=(*(remark for remark in told if remark), *understood.remarks),
+        codes={
+            row: _code(column.name, value, others)
+            for row, value, one in zip(column.rows, values.tolist(), coded, strict=True)
+            if one
+        },
+    )
+
+
+def _understood(column: Column, marks: Collection[str], numbers: Sequence[float]) -> Understood:
     kind = column.settings.get("kind", "binary" if "levels" in column.settings else _guess(column, numbers))
     return _continuous(column, marks) if kind == "continuous" else _binary(column, numbers)
 
@@ -166,13 +202,20 @@ def _doubts(column: Column, values: NDArray[np.float64]) -> tuple[Remark, ...]:
     codes = _missing_codes(values)
     rest = values[~np.isin(values, codes)]
     far = np.array([value for value in np.unique(rest) if _is_far(value, rest)])
-    found = [_suspected(column, values, code) for code in codes]
-    found += [_strayed(column, values, value) for value in far[:5]]
+    found = [_strayed(column, values, value) for value in far[:5]]
+    found += [_suspected(column, values, code) for code in codes]
     if _look_like_categories(column, rest):
         found.append(_categories(column, rest))
     if len(np.unique(values)) == 2 and "kind" not in column.settings:
         found.append(_two_valued(column, values, "a number", 'kind = "binary"'))
     return tuple(found)
+
+
+def _sure_codes(values: NDArray[np.float64]) -> list[float]:
+    """Those of :func:`_missing_codes` that are hardly ever a value."""
+    codes = _missing_codes(values)
+    rest = values[~np.isin(values, codes)]
+    return [code for code in codes if code <= SURELY_BELOW or code > SURELY_TIMES * rest.max()]
 
 
 def _missing_codes(values: NDArray[np.float64]) -> list[float]:
@@ -216,6 +259,23 @@ def _is_far(value: float, values: NDArray[np.float64]) -> bool:
 def _suspected(column: Column, values: NDArray[np.float64], code: float) -> Remark:
     sentence = f"{_apart(column, values, code)}, and otherwise {_range(values[values != code])}"
     return Remark("look", "missing", sentence, "if that stands for a missing value, drop the row")
+
+
+def _coded(column: Column, chosen: NDArray[np.bool_], code: float, others: str) -> Remark | None:
+    """On a column whose cells hold a code; None where none does."""
+    if not chosen.any():
+        return None
+    sentence = f"'{column.name}' is {code:g} in {_where(column, chosen)}, and otherwise {others}"
+    remedy = (
+        "that stands for a missing value, so the row is left out unless --accept ROW says that it is meant"
+    )
+    return Remark("refuse", "missing", sentence, remedy)
+
+
+def _code(name: str, code: float, others: str) -> Remark:
+    """On a row."""
+    sentence = f"'{name}' is {code:g} and otherwise {others}, so it stands for a missing value"
+    return Remark("refuse", "missing", sentence, "correct it")
 
 
 def _strayed(column: Column, values: NDArray[np.float64], value: float) -> Remark:

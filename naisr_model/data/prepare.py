@@ -12,7 +12,7 @@ import json
 import re
 import shutil
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -30,7 +30,7 @@ from naisr_model.data.comparison import (
     compared_with_people,
     joined,
 )
-from naisr_model.data.remarks import Remark, gravest_first
+from naisr_model.data.remarks import Remark, answerable, gravest_first
 from naisr_model.data.report import PreparationReport, RowRemark, rejected
 from naisr_model.data.split import held_out_mask
 from naisr_model.data.stages import Look, Placed, Sampling, inspect, place, write_samples
@@ -62,6 +62,8 @@ class PrepareOptions:
         held_out: share of the subjects kept for evaluation.
         seed: of the split and of the samples.
         workers: processes; None for one a core, 1 to stay in this process.
+        accepted: rows of the table, the header being 1, that somebody has looked at: what only comparing
+            them with the others suspects does not leave them out.
     """
 
     surface_samples: int = 100_000
@@ -70,6 +72,7 @@ class PrepareOptions:
     held_out: float = 0.2
     seed: int = 0
     workers: int | None = None
+    accepted: tuple[int, ...] = ()
 
 
 def prepare(
@@ -105,7 +108,8 @@ def _prepare(table: ShapeTable, out: Path, options: PrepareOptions, progress: Pr
     with processes(options.workers) as run:
         held_out = held_out_mask([row.subject for row in table.rows], options.held_out, options.seed)
         looks = [(row, table.alignment.method) for row in table.rows]
-        inputs = _beside_each_other(table, in_order(run(inspect, looks, progress.part(0.0, 0.05))))
+        inspected = in_order(run(inspect, looks, progress.part(0.0, 0.05)))
+        inputs = _beside_each_other(table, _without_coded(table, inspected))
         alignment, placed = _aligned(table, inputs, held_out, run, progress.part(0.05, 0.1))
         with _telling_rejected(table, [item.remarks for item in placed]):
             usable = _usable(table, placed)
@@ -122,7 +126,7 @@ def _prepare(table: ShapeTable, out: Path, options: PrepareOptions, progress: Pr
         frame=frame,
         alignment=alignment,
         source=table.source,
-        options={key: value for key, value in asdict(options).items() if key != "workers"},
+        options={key: value for key, value in asdict(options).items() if key not in ("workers", "accepted")},
         folders=folders,
     )
     _remove(out / store.SHAPES, _SAMPLES, set(folders))
@@ -151,7 +155,7 @@ def require_possible(options: PrepareOptions) -> None:
 
 def _checked_table(csv: str | Path, options: PrepareOptions) -> ShapeTable:
     require_possible(options)
-    table = tables.read_table(csv)
+    table = tables.read_table(csv, options.accepted)
     if any(row.mesh == Path(csv).parent for row in table.rows):
         raise InputError(f"{Path(csv).name} has no column 'mesh'; add one with the path of each mesh")
     return table
@@ -229,19 +233,33 @@ def _telling_rejected(table: ShapeTable, remarks: Sequence[Sequence[Remark]]) ->
 # --- what lies between the stages ---------------------------------------------------------------
 
 
+def _without_coded(table: ShapeTable, looks: Sequence[Look]) -> list[Look]:
+    """The looks without rows that have a code for a missing value, which others are not compared with."""
+    coded = _answerable(table, table.codes)
+    return [
+        Look((*look.remarks, *codes)) if codes else look for look, codes in zip(looks, coded, strict=True)
+    ]
+
+
+def _answerable(table: ShapeTable, remarks: Iterable[Iterable[Remark]]) -> list[list[Remark]]:
+    """What is suspected of each row, unless somebody has looked at it."""
+    rows = zip(table.rows, remarks, strict=True)
+    return [[answerable(remark, row.number, table.accepted) for remark in found] for row, found in rows]
+
+
 def _beside_each_other(table: ShapeTable, looks: Sequence[Look]) -> list[Look]:
     """The looks with what only a comparison of rows shows, and landmarks named alike."""
     looks = [look._replace(landmarks=marks) for look, marks in zip(looks, _named_alike(looks), strict=True)]
     bulks = [look.bulk for look in looks]
-    shapes = compared_shapes(table.rows, bulks, [look.space for look in looks], table.values)
+    spaces = [look.space for look in looks]
+    shapes = _answerable(table, compared_shapes(table.rows, bulks, spaces, table.values))
     sound = [
         look.landmarks if not _refused(found) else None for look, found in zip(looks, shapes, strict=True)
     ]
-    marks = compared_landmarks(sound, bulks)
+    marks = _answerable(table, compared_landmarks(sound, bulks))
     # One that lies the other way round would become what all are moved onto, or stay as it is.
-    turned = compared_places(
-        bulks, [centred(bulk) for bulk in bulks] if table.alignment.method == "icp" else []
-    )
+    centres = [centred(bulk) for bulk in bulks] if table.alignment.method == "icp" else []
+    turned = _answerable(table, compared_places(bulks, centres))
     said = [(*look.remarks, *found) for look, found in zip(looks, joined(shapes, marks, turned), strict=True)]
     return [look._replace(remarks=remarks) for look, remarks in zip(looks, said, strict=True)]
 
@@ -268,7 +286,7 @@ def _aligned(
         whole = [i for i, look in enumerate(looks) if not _refused(look.remarks)]
         places = [(alignment, table.rows[i].mesh, looks[i].landmarks) for i in whole]
         found = in_order(run(place, places, progress))
-        placed = _in_one_frame(looks, dict(zip(whole, found, strict=True)))
+        placed = _in_one_frame(table, looks, dict(zip(whole, found, strict=True)))
         wrong = [i for i in whole if _refused(placed[i].remarks)]
         if alignment.method == "none" or held_out[wrong].all():
             return alignment, placed
@@ -277,11 +295,11 @@ def _aligned(
         ]
 
 
-def _in_one_frame(looks: Sequence[Look], found: Mapping[int, Placed]) -> list[Placed]:
+def _in_one_frame(table: ShapeTable, looks: Sequence[Look], found: Mapping[int, Placed]) -> list[Placed]:
     """Every row with all that was said of it, its place in the frame compared with the others'."""
     placed = [found.get(i, Placed(())) for i in range(len(looks))]
     transforms = [np.array(item.transform) if item.transform else None for item in placed]
-    said = compared_places([look.bulk for look in looks], transforms)
+    said = _answerable(table, compared_places([look.bulk for look in looks], transforms))
     return [
         item._replace(remarks=(*look.remarks, *item.remarks, *remarks))
         for look, item, remarks in zip(looks, placed, said, strict=True)

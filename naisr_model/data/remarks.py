@@ -8,8 +8,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from collections.abc import Collection, Iterable
+from dataclasses import asdict, dataclass, replace
 from typing import Literal
 
 Severity = Literal["refuse", "look", "fine"]
@@ -43,6 +43,21 @@ class Remark:
     def to_json(self) -> dict[str, str]:
         """For programs."""
         return asdict(self)
+
+
+def answerable(remark: Remark, row: int, accepted: Collection[int]) -> Remark:
+    """A suspicion that refuses a row: with how to say that it is right, or as such where somebody did.
+
+    Args:
+        remark: on the row.
+        row: of a table, as a spreadsheet counts.
+        accepted: rows that somebody has looked at.
+    """
+    if remark.severity != "refuse":
+        return remark
+    if row in accepted:
+        return replace(remark, severity="look", remedy=f"it was kept by --accept {row}")
+    return replace(remark, remedy=f"{remark.remedy}, or keep it with --accept {row} if it is right")
 
 
 def gravest_first(remarks: Iterable[Remark]) -> tuple[Remark, ...]:

@@ -23,7 +23,7 @@ import os
 import re
 import tomllib
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PureWindowsPath
 from typing import Any, get_args
@@ -77,7 +77,9 @@ class ShapeTable:
         alignment: method and origin; the reference is made later.
         source: the TOML's ``[source]`` table.
         told: how each covariate was understood, a line each.
-        remarks: what looks wrong in the table, or was set right.
+        remarks: what looks wrong in the table, or was set right; values far from the others first.
+        codes: of each row, what is almost surely a code for a missing value; the values are NaN there.
+        accepted: rows, by number, that are right whatever is suspected of them.
     """
 
     name: str
@@ -88,6 +90,8 @@ class ShapeTable:
     source: dict[str, Any]
     told: tuple[str, ...]
     remarks: tuple[Remark, ...]
+    codes: tuple[tuple[Remark, ...], ...]
+    accepted: frozenset[int]
 
     @property
     def summary(self) -> tuple[str, ...]:
@@ -99,19 +103,23 @@ class ShapeTable:
 
     def take(self, indices: Sequence[int]) -> ShapeTable:
         """The table with only some of its rows."""
-        rows = tuple(self.rows[i] for i in indices)
-        return replace(self, rows=rows, values=self.values[list(indices)])
+        rows, codes = tuple(self.rows[i] for i in indices), tuple(self.codes[i] for i in indices)
+        return replace(self, rows=rows, codes=codes, values=self.values[list(indices)])
 
 
-def read_table(path: str | Path) -> ShapeTable:
+def read_table(path: str | Path, accepted: Collection[int] = ()) -> ShapeTable:
     """Read ``path`` and the TOML beside it.
 
     The kind of a covariate is guessed where the TOML does not give it: words, or two distinct numbers
     without a unit, make it binary, the first in sorted order being -1. Where there is a ``landmarks``
     column, alignment by landmarks is the default.
 
+    Args:
+        path: of the table.
+        accepted: rows, by number, that are right whatever is suspected of them, as a true 999 is.
+
     Raises:
-        InputError: naming all rows and columns that cannot be used.
+        InputError: naming all rows and columns that cannot be used, or an accepted row that is not there.
     """
     path = Path(path)
     sheet = read_sheet(path)
@@ -124,7 +132,8 @@ def read_table(path: str | Path) -> ShapeTable:
     if len(sheet.lines) == 1:
         raise InputError(f"{path.name} has one row, of which nothing can be learned; add one row a mesh")
     rows, faults = _rows(path, sheet, titles)
-    readings = _readings(path, sheet, titles, extra.get("covariates", {}))
+    _require_rows(path, rows, accepted)
+    readings = _readings(path, sheet, titles, extra.get("covariates", {}), accepted)
     refuse(path.name, [*faults, *(fault for reading in readings for fault in reading.faults)])
     return ShapeTable(
         name=extra.get("name", path.stem),
@@ -137,9 +146,23 @@ def read_table(path: str | Path) -> ShapeTable:
         remarks=(
             *sheet.remarks,
             *_one_subject(rows),
-            *(remark for reading in readings for remark in reading.remarks),
+            *sorted(
+                (remark for reading in readings for remark in reading.remarks),
+                key=lambda remark: remark.topic != "outlier",
+            ),
         ),
+        codes=tuple(
+            tuple(reading.codes[row.number] for reading in readings if row.number in reading.codes)
+            for row in rows
+        ),
+        accepted=frozenset(accepted),
     )
+
+
+def _require_rows(path: Path, rows: Sequence[TableRow], accepted: Collection[int]) -> None:
+    if gone := sorted(set(accepted) - {row.number for row in rows}):
+        ends = f"{rows[0].number} to {rows[-1].number}, the header being 1"
+        raise InputError(f"{path.name} has no row {gone[0]} to accept; its rows are {ends}")
 
 
 def _one_subject(rows: Sequence[TableRow]) -> tuple[Remark, ...]:
@@ -305,7 +328,11 @@ def missing_files(table: ShapeTable) -> tuple[str, ...]:
 
 
 def _readings(
-    path: Path, sheet: Sheet, titles: Mapping[str, tuple[str, str]], settings: Mapping[str, Any]
+    path: Path,
+    sheet: Sheet,
+    titles: Mapping[str, tuple[str, str]],
+    settings: Mapping[str, Any],
+    accepted: Collection[int],
 ) -> list[Understood]:
     """Every covariate as it is understood."""
     numbers = tuple(line.number for line in sheet.lines)
@@ -316,7 +343,7 @@ def _readings(
         for own in (settings.get(name, {}),)
     ]
     marks = decimal_marks(cell for column in columns for cell in column.cells)
-    return [read_column(column, marks) for column in columns]
+    return [read_column(column, marks, accepted) for column in columns]
 
 
 def _unit(path: Path, name: str, header_unit: str, settings: Mapping[str, Any]) -> str:

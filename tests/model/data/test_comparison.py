@@ -42,14 +42,17 @@ def bent_pear(size: float) -> trimesh.Trimesh:
 def prepared(tmp_path, capsys):
     """``prepared(method, changes)`` prepares a cohort and gives what was said, the report and the store."""
 
-    def run(method="none", **changes):
+    def run(method="none", accept=(), **changes):
         rng = np.random.default_rng(1)
         people = [Person(number, rng) for number in range(PEOPLE)]
         for name, change in changes.items():
             change(people[int(name.removeprefix("p"))], people)
         table = write(tmp_path, people, method)
         samples = [f"--{kind}-samples=50" for kind in ("surface", "near", "uniform")]
-        code = cli.main(["prepare", str(table), "--out", str(tmp_path / "store"), *samples, "--workers=1"])
+        accepted = [word for row in accept for word in ("--accept", str(row))]
+        code = cli.main(
+            ["prepare", str(table), "--out", str(tmp_path / "store"), *samples, "--workers=1", *accepted]
+        )
         said = capsys.readouterr()
         assert code == 0, said.err
         report = json.loads((tmp_path / "store" / "report.json").read_text())
@@ -166,6 +169,50 @@ def test_one_mesh_for_two_visits_of_a_subject_is_told(prepared):
     assert "the mesh is that of row 4, another visit of the same subject" in said
 
 
+def test_rows_that_were_looked_at_are_kept_and_told(prepared):
+    def third(person, people):
+        of_the_third(person, people, "copy.ply")
+
+    _, report, store = prepared("none", accept=[7], p5=third)
+    assert [remark["row"] for remark in report["rejected"]] == [4]
+    assert "or keep it with --accept 4 if it is right" in report["rejected"][0]["reason"]
+    assert (7, "repeated") in [(one["row"], one["topic"]) for one in report["warnings"]]
+    assert len(store) == PEOPLE - 1
+    _, report, store = prepared("none", accept=[7, 4], p5=third)
+    assert (report["rejected"], len(store)) == ([], PEOPLE)
+    kept = [one["row"] for one in report["warnings"] if "it was kept by --accept" in one["reason"]]
+    assert kept == [4, 7]
+
+
+@pytest.mark.parametrize("name", ["centimetres", "mirrored", "elsewhere"])
+def test_so_is_a_mesh_unlike_the_others(prepared, name):
+    method, change, first, *_ = WRONG[name]
+    _, report, store = prepared(method, accept=[7], p5=change)
+    assert (report["rejected"], len(store)) == ([], PEOPLE)
+    assert [(one["row"], one["severity"]) for one in report["warnings"]] == [(7, "look")]
+    assert first in report["warnings"][0]["reason"]
+
+
+def test_a_row_with_a_code_is_left_out_as_if_it_had_not_been_there(prepared):
+    def coded(person, _people):
+        person.age = 999
+
+    said, report, store = prepared("none", p5=coded)
+    assert [(one["row"], one["topic"]) for one in report["rejected"]] == [(7, "missing")]
+    assert "refuse: 'age' is 999 in row 7, and otherwise 20 to 130" in said
+    assert "age [months]: a number from 20 to 130" in said and report["warnings"] == []
+    assert (len(store), store.population.covariates[0].range[1]) == (PEOPLE - 1, 130)
+    _, report, store = prepared("none", accept=[7], p5=coded)
+    assert (report["rejected"], len(store)) == ([], PEOPLE)
+    assert 999 in store.population.values[:, 0]
+
+
+def test_an_accepted_row_that_is_not_there_is_told(tmp_path, capsys):
+    (tmp_path / "data.csv").write_text("mesh,subject,age\na.stl,a,1\nb.stl,b,2\nc.stl,c,7\n")
+    assert cli.main(["prepare", str(tmp_path / "data.csv"), "--check", "--accept", "9"]) == 2
+    assert "has no row 9 to accept; its rows are 2 to 4" in capsys.readouterr().err
+
+
 def test_another_volume_than_at_such_covariates_is_told(prepared):
     _, report, store = prepared("landmarks", p11=thinner)
     assert [remark["row"] for remark in report["warnings"]] == [13]
@@ -249,12 +296,14 @@ def test_half_of_a_cohort_in_metres_is_left_out(prepared):
 
 
 def test_a_table_is_checked_without_preparing(tmp_path, capsys):
-    (tmp_path / "data.csv").write_text("mesh;subject;age\ngone.stl;a;1,5\nhere.stl;b;-99\nhere.stl;c;7\n")
+    (tmp_path / "data.csv").write_text(
+        "mesh;subject;age\ngone.stl;a;1,5\nhere.stl;b;-99\nhere.stl;c;7\nc.stl;d;3\n"
+    )
     (tmp_path / "here.stl").write_text("")
     assert cli.main(["prepare", str(tmp_path / "data.csv"), "--check"]) == 0
     said = capsys.readouterr().out
-    assert "age: a number from -99 to 7" in said
-    assert "look: 'age' is -99 in row 3" in said
+    assert "age: a number from 1.5 to 7" in said
+    assert "refuse: 'age' is -99 in row 3" in said
     assert "row 2" in said and "gone.stl does not exist" in said
     assert sorted(path.name for path in tmp_path.iterdir()) == ["data.csv", "here.stl"]
     assert cli.main(["prepare", str(tmp_path / "data.csv")]) == 2

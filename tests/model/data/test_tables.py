@@ -206,10 +206,9 @@ def test_hundreds_of_bad_cells_make_one_sentence(tmp_path):
 
 
 LOOKS = {
-    "-99": ("subject,age\na,-99\nb,24\nc,110\nd,57\n", "'age' is -99 in row 2, and otherwise 24 to 110"),
-    "999": ("subject,age\na,24\nb,999\nc,110\nd,999\n", "'age' is 999 in rows 3 and 5, and otherwise 24"),
-    "-9 and 999": ("subject,w\na,-9\nb,999\nc,11\nd,15\ne,12\n", "'w' is -9 in row 2"),
-    "codes": ("subject,grade\na,1\nb,2\nc,9\nd,1\n", "'grade' is 9 in row 4, and otherwise 1 to 2"),
+    "-1": ("subject,age\na,-1\nb,24\nc,110\nd,57\n", "'age' is -1 in row 2, and otherwise 24 to 110"),
+    "99": ("subject,kg\na,40\nb,99\nc,11\nd,60\n", "'kg' is 99 in row 3, and otherwise 11 to 60"),
+    "9": ("subject,grade\na,1\nb,3\nc,9\nd,5\n", "'grade' is 9 in row 4, and otherwise 1 to 5"),
     "categories": ("subject,type\na,1\nb,2\nc,3\nd,1\n", "only the values 1, 2, 3 and was read as a number"),
     "two ages": (
         "subject,age [months]\na,6\nb,24\nc,6.0\n",
@@ -225,6 +224,52 @@ LOOKS = {
 def test_what_looks_wrong_is_told(tmp_path, name):
     text, words = LOOKS[name]
     assert any(words in one.text for one in table(tmp_path, text).remarks if one.severity == "look")
+
+
+CODES = {
+    "-99": ("age,-99,24,110,57", "'age' is -99 in row 2, and otherwise 24 to 110", "24 to 110"),
+    "999": ("age,24,999,110,999,3", "'age' is 999 in rows 3 and 5, and otherwise 3 to 110", "3 to 110"),
+    "-9 and 999": ("w,-9,999,11,15,12", "'w' is -9 in row 2, and otherwise 11 to 15", "11 to 15"),
+    "of levels": ("sex,1,2,9,1", "'sex' is 9 in row 4, and otherwise 1 to 2", "1 in 2 rows, 2 in 1 row"),
+}
+
+
+@pytest.mark.parametrize("name", CODES)
+def test_what_is_almost_surely_a_code_refuses_its_rows_and_counts_for_nothing(tmp_path, name):
+    column, words, told = CODES[name]
+    title, *cells = column.split(",")
+    text = f"subject,{title}\n" + "".join(f"p{i},{cell}\n" for i, cell in enumerate(cells))
+    read = table(tmp_path, text)
+    coded = [i for i, cell in enumerate(cells) if cell in ("-99", "999", "-9", "9")]
+    assert [i for i, codes in enumerate(read.codes) if codes] == coded
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(read.values[:, 0])), coded)
+    assert told in read.told[0]
+    assert any(
+        words in one.text and "--accept" in one.text for one in read.remarks if one.severity == "refuse"
+    )
+    assert not any(read.take([i for i in range(len(cells)) if i not in coded]).codes)
+
+
+def test_a_code_that_is_meant_is_a_value_in_its_row_alone(tmp_path):
+    text = "subject,age\na,24\nb,999\nc,110\nd,999\n"
+    table(tmp_path, text)
+    read = read_table(tmp_path / "data.csv", accepted=[3])
+    np.testing.assert_array_equal(read.values[:, 0], [24, 999, 110, np.nan])
+    assert [len(codes) for codes in read.codes] == [0, 0, 0, 1]
+    assert any("'age' is 999 in row 3" in one.text for one in read.remarks if one.severity == "look")
+    with pytest.raises(InputError, match=r"data\.csv has no row 7 to accept; its rows are 2 to 5"):
+        read_table(tmp_path / "data.csv", accepted=[3, 7])
+
+
+def test_levels_of_the_toml_are_no_codes(tmp_path):
+    read = table(tmp_path, "subject,x\na,1\nb,99\nc,1\n", "[covariates.x]\nlevels = [1, 99]")
+    np.testing.assert_array_equal(read.values[:, 0], [-1, 1, -1])
+
+
+def test_values_far_from_the_others_are_told_first(tmp_path):
+    rows = "".join(f"p{i},{1 + i % 3},{12 + i % 5}\n" for i in range(12))
+    read = table(tmp_path, f"subject,grade,w [kg]\n{rows}q,1,115\n")
+    assert [remark.topic for remark in read.remarks] == ["outlier", "kind"]
 
 
 @pytest.mark.parametrize(
