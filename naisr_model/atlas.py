@@ -36,7 +36,7 @@ from naisr_model.errors import InputError
 from naisr_model.frames import Frame
 from naisr_model.learning.fitting.belief import places_of
 from naisr_model.learning.fitting.evidence import ShapeFit
-from naisr_model.learning.fitting.placing import motion_of
+from naisr_model.learning.fitting.placing import Placing, placing_of
 from naisr_model.learning.fitting.posterior import (
     POINTS,
     TWO_SIDED_95,
@@ -606,6 +606,7 @@ class Fit:
         inferred: names of the covariates that were not known.
         residual_mm: mean distance of the patient's points, others than those of the fit, to the surface.
         seconds: what the fit took.
+        astray_mm: how far off the patient seems to lie, where somebody has looked and found that it does.
     """
 
     individual: Individual
@@ -613,6 +614,7 @@ class Fit:
     inferred: tuple[str, ...]
     residual_mm: float
     seconds: float
+    astray_mm: float | None = None
 
     @property
     def covariates(self) -> dict[str, float]:
@@ -662,13 +664,15 @@ class Fit:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """A sentence on each covariate that the shape does not settle, or one on a shape that was missed."""
+        """Sentences on a patient astray and covariates that it does not settle, or one on a shape missed."""
         if not self.is_valid:
             return (
                 f"not valid: the fitted surface is {self.residual_mm:,.1f} mm from the scan on average; "
                 "align it to the atlas, and check that it is such a shape",
             )
         sentences = []
+        if self.astray_mm is not None:
+            sentences.append(f"the scan seems to lie {self.astray_mm:.1f} mm off; align it to the atlas")
         for covariate in self.individual.atlas.covariates:
             low, high = self.intervals.get(covariate.name, (0.0, 0.0))
             extent = covariate.range[1] - covariate.range[0]
@@ -681,10 +685,8 @@ class Fit:
                 )
         return tuple(sentences)
 
-    def motion_mm(
-        self, shape: trimesh.Trimesh | ArrayLike, *, progress: Progress = SILENT
-    ) -> NDArray[np.float64]:
-        """The rigid motion, 4x4 in millimetres, after which this or a better fit explains the patient best.
+    def placing_mm(self, shape: trimesh.Trimesh | ArrayLike, *, progress: Progress = SILENT) -> Placing:
+        """The rigid motion in millimetres after which this or a better fit explains the patient best.
 
         It is sought together with the code and the inferred covariates, see
         :mod:`~naisr_model.learning.fitting.placing`.
@@ -700,9 +702,11 @@ class Fit:
         problem = individual.posterior.problem
         sample = draw_sample(target_of(shape, frame), POINTS, CHECK_SAMPLE)
         with threadpool_limits(1, user_api="blas"):
-            motion = motion_of(problem, sample, problem.pack(individual.vector, individual.latent), progress)
+            found = placing_of(problem, sample, problem.pack(individual.vector, individual.latent), progress)
+        motion = found.motion.copy()
         motion[:3, 3] = frame.to_mm(motion[:3, 3]) - motion[:3, :3] @ np.array(frame.centre_mm)
-        return motion
+        far, before, after = (frame.scale_mm * each for each in (found.moved, found.before, found.after))
+        return Placing(motion, far, before, after)
 
     @property
     def volume_cm3(self) -> float:

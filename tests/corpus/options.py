@@ -314,6 +314,8 @@ CASES = (
                     ("--workers", "-3"),
                     ("--workers", "1e9"),
                 ),
+                *(("--accept", "0"), ("--accept", "1"), ("--accept", "99"), ("--accept", "-1")),
+                *(("--accept", "x"), ("--accept", "2.5"), ("--accept", "2-4"), ("--accept", "")),
                 *(("--surface-samples", "0"), ("--near-samples", "-5"), ("--uniform-samples", "many")),
                 *(
                     ("--surface-samples", "1000000000000"),

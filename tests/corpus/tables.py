@@ -278,16 +278,21 @@ _CELLS = [
         for missing in ("", "NA", "n/a", "NaN", "-", "?", "null", "none", ".", "#N/A")
     ),
     *(
+        _case(f"{code} for an age", csv(changed(3, 3, code)), least=7, says=code.lstrip("-"))
+        for code in ("999", "-9", "-99", "9999")
+    ),
+    *(
         _case(
-            f"{code} for an age",
+            f"{code} for an age that is meant",
             csv(changed(3, 3, code)),
-            "either",
             without=[2],
-            least=7,
+            words=(*WORDS, "--accept", "4"),
             says=code.lstrip("-"),
         )
-        for code in ("999", "-9", "-99", "1e308", "9999")
+        for code in ("999", "-9")
     ),
+    _case("1e308 for an age", csv(changed(3, 3, "1e308")), "either", without=[2], least=7, says="1e"),
+    _case("a mesh under two names", csv(changed(3, 0, "egg4.stl")), least=6, says="another subject"),
     _case("infinity", csv(changed(3, 3, "inf")), "refused"),
     _case("1e400", csv(changed(3, 3, "1e400")), "refused"),
     _case("a formula", csv(changed(3, 3, "=1+2")), "refused"),

@@ -41,6 +41,23 @@ SETTLED = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
+class Placing:
+    """Where a patient is explained best.
+
+    Attributes:
+        motion: rigid, 4x4, from where it lies.
+        moved: mean distance by which the motion carries its points.
+        before: mean distance of its points to the fitted surface as it lies.
+        after: the same once it is moved, code and covariates following.
+    """
+
+    motion: Vector
+    moved: float
+    before: float
+    after: float
+
+
+@dataclass(frozen=True, eq=False)
 class _Place:
     """Somewhere on the way.
 
@@ -56,9 +73,14 @@ class _Place:
     points: Vector
     rows: Rows
 
+    @property
+    def distance(self) -> float:
+        """Mean distance of the points on the surface."""
+        return float(np.abs(self.rows.residuals[self.rows.surface]).mean())
 
-def motion_of(problem: Problem, sample: Sample, parameters: Vector, progress: Progress = SILENT) -> Vector:
-    """The rigid 4x4 motion, model units, after which a patient is explained best.
+
+def placing_of(problem: Problem, sample: Sample, parameters: Vector, progress: Progress = SILENT) -> Placing:
+    """Where a patient is explained best, in model units.
 
     Args:
         problem: which covariates are free besides the code.
@@ -69,7 +91,8 @@ def motion_of(problem: Problem, sample: Sample, parameters: Vector, progress: Pr
     Raises:
         Cancelled: when nobody waits for it any more.
     """
-    here, damping = _place(problem, sample, np.eye(4), parameters), FIRST_DAMPING
+    start = here = _place(problem, sample, np.eye(4), parameters)
+    damping = FIRST_DAMPING
     for _ in range(STEPS):
         progress.check()
         there = _stepped(problem, sample, here, damping)
@@ -84,7 +107,8 @@ def motion_of(problem: Problem, sample: Sample, parameters: Vector, progress: Pr
                 break
         elif (damping := damping * STIFFENED) > STIFFEST:
             break
-    return here.motion
+    far = np.linalg.norm(here.points - start.points, axis=1)[here.rows.surface].mean()
+    return Placing(here.motion, float(far), start.distance, here.distance)
 
 
 def _place(problem: Problem, sample: Sample, motion: Vector, parameters: Vector) -> _Place:

@@ -102,3 +102,23 @@ def test_one_astray_is_told_of_before_it_is_fitted(atlas, tmp_path, motion):
     assert remark.severity == "look" and intake.is_ready
     assert "align it to the atlas" in remark.remedy
     assert not atlas.fit(intake.patient.mesh_mm, {"age": 8.0}).is_valid
+
+
+def lower(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+    return mesh.submesh([np.flatnonzero(mesh.triangles_center[:, 2] < 4.0)], append=True)
+
+
+@pytest.mark.parametrize("part", [lambda mesh: mesh, lower], ids=["whole", "part"])
+@pytest.mark.parametrize(("age", "known"), [(2.0, {}), (6.0, KNOWN), (8.5, {"sex": 1.0})])
+def test_a_fit_tells_of_a_scan_that_lies_off_and_of_no_other(atlas, tmp_path, part, age, known):
+    for distance_mm in (0.0, 1.2):
+        motion = turned(0, [0.0, 0.6 * distance_mm, 0.8 * distance_mm])
+        lay = read(saved(part(egg(age, 1.0)), tmp_path / "egg.stl", motion), atlas)
+        fit, lies = fitted_in_place(lay, atlas, known)
+        told = [remark for remark in fit.remarks if "seems to lie" in remark]
+        assert lies is lay and fit.is_valid
+        if distance_mm:
+            assert fit.astray_mm == pytest.approx(distance_mm, rel=0.3)
+            assert told == [f"the scan seems to lie {fit.astray_mm:.1f} mm off; align it to the atlas"]
+        else:
+            assert fit.astray_mm is None and not told
