@@ -17,7 +17,9 @@ GAIN = 0.9
 
 ASTRAY_SHARE, ASTRAY_GAIN = 0.01, 0.5
 """A patient that was not laid onto its fit lies astray where a rigid motion by more than this share of the
-atlas's unit of length brings the distance to its fit down to such a share or less. @@
+atlas's unit of length brings the distance to its fit down to such a share or less. Of 20 held-out airways in
+place, whole, in part and as clouds, none does (whole ones move by 0.006 at most, and come no nearer); of airways
+3 mm off 36 in 38 do, 5 mm off 46 in 47. Bodies, which bend at every joint, hide being off more often.
 """
 
 

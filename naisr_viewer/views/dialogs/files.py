@@ -14,7 +14,7 @@ ATLAS_FILTER = f"Atlas (*{ATLAS_ENDING});;All files (*)"
 PICTURE_ENDING = ".png"
 SCAN_ENDINGS = (
     *("stl", "ply", "obj", "vtk", "vtp", "glb"),
-    *("nii", "nii.gz", "hdr", "img", "nrrd", "nhdr", "mha", "mhd"),
+    *("nii", "nii.gz", "hdr", "hdr.gz", "img", "img.gz", "nrrd", "nhdr", "mha", "mhd"),
     *("csv", "txt", "xyz"),
 )
 """Meshes, label volumes and text files of points that can be opened as a scan."""
