@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -55,6 +56,7 @@ from naisr_model.models.base import ShapeModel, additive, deformable
 from naisr_model.models.devices import usable_device
 from naisr_model.progress import SILENT, Progress
 from naisr_model.surface.blending import blended
+from naisr_model.surface.carrying import carried
 from naisr_model.surface.displacements import Displacements, DisplacementTables, tabulate
 from naisr_model.surface.fields import distances, effect_field, shape_field, template_field
 from naisr_model.surface.isosurface import isosurface
@@ -67,6 +69,9 @@ from naisr_model.surface.volume import enclosed_volume
 VOLUME_RESOLUTION = 128
 FINEST = 1024
 """Of the resolutions: its lattice takes 4 GB."""
+
+TOGETHER = 4
+"""Shapes that points are carried to at once: their activations stay in the processor's cache."""
 
 CHECK_SAMPLE = 2000
 """Seed of the points at which a fit's residual is measured; the fit itself draws others."""
@@ -387,6 +392,40 @@ class Atlas:
             effects_mm=found.effects.numpy(force=True) * self.frame.scale_mm,
             person_mm=found.person.numpy(force=True) * self.frame.scale_mm,
         )
+
+    def carried_mm(
+        self,
+        origins_mm: ArrayLike,
+        covariates: Sequence[Values],
+        latents: Sequence[ArrayLike] | NDArray[np.floating] | None = None,
+        *,
+        progress: Progress = SILENT,
+    ) -> NDArray[np.float64]:
+        """Where points of the template are in many shapes, ``[shapes, n, 3]`` in millimetres.
+
+        Args:
+            origins_mm: on the template, ``[n, 3]``.
+            covariates: real values by name, of each shape.
+            latents: its code, ``[shapes, L]``; left out, the population average is meant.
+            progress: told the finished share, checked between some shapes.
+
+        Raises:
+            InputError: for an unknown covariate or one out of range, where points have no place because the
+                deformation folds, and where the model deforms no template.
+            Cancelled: when nobody waits for it any more.
+        """
+        model, targets = deformable(self._model), self._model.tensor(self.frame.to_model(origins_mm))
+        vectors = [self._vector(values, False) for values in covariates]
+        average = [self._latent(None)] * len(vectors)
+        codes = average if latents is None else [self._latent(code) for code in latents]
+        pieces = progress.over(range(0, len(vectors), TOGETHER))
+        found = [
+            carried(
+                model, targets, *(torch.stack(rows[start : start + TOGETHER]) for rows in (vectors, codes))
+            )
+            for start, _ in pieces
+        ]
+        return self.frame.to_mm(torch.cat(found).numpy(force=True))
 
     def complete(self, covariates: Values, *, extrapolate: bool = False) -> dict[str, float]:
         """Real values of all covariates; those left out are at the population centre.

@@ -79,7 +79,7 @@ def places(
         if missing.norm(dim=-1).max() <= RESOLVED:
             return points
         slopes = identity + jacobian(displaced, located)[0].detach()
-        points = points + _shortened(torch.linalg.lstsq(slopes, missing[..., None]).solution[..., 0])
+        points = points + shortened(torch.linalg.lstsq(slopes, missing[..., None]).solution[..., 0])
     raise InputError(
         "the deformation folds at this point, so it has no one place in the shape; choose another"
     )
@@ -96,5 +96,6 @@ def parts(model: AdditiveModel, points: Tensor, covariates: Tensor, latent: Tens
         return Parts(points, unit, -alone, (alone - moved).sum(dim=0).detach())
 
 
-def _shortened(steps: Tensor) -> Tensor:
+def shortened(steps: Tensor) -> Tensor:
+    """Steps ``[..., dim]``, none longer than :data:`LONGEST_STEP`."""
     return steps * (LONGEST_STEP / steps.norm(dim=-1, keepdim=True).clamp(min=LONGEST_STEP))
