@@ -29,6 +29,7 @@ FLOORS = {
         ("checkpoint",),
         ("learning",),
         ("atlas",),
+        ("measures",),
         ("patients",),
         ("evaluation",),
         ("benchmark",),
