@@ -9,6 +9,7 @@ from typing import Any
 from naisr_model.evaluation.studies.calibration import Calibration
 from naisr_model.evaluation.studies.completion import Completion
 from naisr_model.evaluation.studies.fitting import Fitting
+from naisr_model.evaluation.studies.norms import NormsStudy
 from naisr_model.evaluation.studies.reconstruction import Reconstruction
 from naisr_model.evaluation.studies.transfer import Transfer
 from naisr_model.evaluation.study import Study
@@ -20,5 +21,6 @@ STUDIES: Mapping[str, type[Study[Any]]] = MappingProxyType(
         "completion": Completion,
         "fitting": Fitting,
         "calibration": Calibration,
+        "norms": NormsStudy,
     }
 )

@@ -38,6 +38,33 @@ class NewPatient:
         return f"{self.subject} {self.visit}"
 
 
+def new_patients(path: Path, count: int) -> list[NewPatient]:
+    """The first visits of people whom an atlas does not know, with covariates inside the observed ranges.
+
+    Raises:
+        InputError: when the atlas is not of a synthetic population, or nobody or too many are asked for.
+    """
+    if not 1 <= count <= MOST_PATIENTS // 2:
+        raise InputError(f"--patients is {count}; give 1 or more, up to {MOST_PATIENTS // 2}")
+    atlas = opened(path)
+    known_population(atlas)
+    inside = [one for one in _everybody(atlas, count).values() if atlas.population.contains(one.values)]
+    first = {visit.subject: visit for visit in reversed(inside)}
+    chosen = list(dict.fromkeys(visit.subject for visit in inside))[:count]
+    return [NewPatient(subject, first[subject].visit) for subject in chosen]
+
+
+def visit_of(atlas: Atlas, case: NewPatient, count: int) -> PopulationVisit:
+    """One of them, of as many as were asked for."""
+    return _everybody(atlas, count)[case.subject, case.visit]
+
+
+def _everybody(atlas: Atlas, count: int) -> dict[tuple[str, str], PopulationVisit]:
+    """Twice as many patients as are asked for: not all are inside the observed ranges."""
+    source = atlas.checkpoint.source
+    return visits_of(str(source["population"]), int(source["seed"]) + OTHER_SEED, 2 * count)
+
+
 @dataclass(frozen=True)
 class Calibration:
     """Count how often the 95 % intervals of a fit hold the truth, over new synthetic patients.
@@ -57,18 +84,11 @@ class Calibration:
         """The first visits of patients of another seed whose covariates are inside the observed ranges.
 
         Raises:
-            InputError: when the atlas is not of a synthetic population, nobody is asked for, or ``known`` has
-                an unknown name.
+            InputError: as :func:`new_patients`, and when ``known`` has an unknown name.
         """
-        if not 1 <= self.patients <= MOST_PATIENTS // 2:
-            raise InputError(f"--patients is {self.patients}; give 1 or more, up to {MOST_PATIENTS // 2}")
-        atlas = opened(self.atlas)
-        known_population(atlas)
-        require_known(self._told(), atlas.covariates)
-        inside = [one for one in self._everybody(atlas).values() if atlas.population.contains(one.values)]
-        first = {visit.subject: visit for visit in reversed(inside)}
-        chosen = list(dict.fromkeys(visit.subject for visit in inside))[: self.patients]
-        return [NewPatient(subject, first[subject].visit) for subject in chosen]
+        chosen = new_patients(self.atlas, self.patients)
+        require_known(self._told(), opened(self.atlas).covariates)
+        return chosen
 
     def measure(self, case: NewPatient, progress: Progress = SILENT) -> Record:
         """Truth, estimate and both ends of the interval of each inferred covariate and of the volume.
@@ -77,7 +97,7 @@ class Calibration:
             Cancelled: when nobody waits any more.
         """
         atlas = opened(self.atlas)
-        visit = self._everybody(atlas)[case.subject, case.visit]
+        visit = visit_of(atlas, case, self.patients)
         mesh_mm = aligned(atlas, *known_population(atlas).visit_shape(visit))
         known = {name: visit.values[name] for name in self._told()}
         fit = atlas.fit(mesh_mm, known, progress=progress)
@@ -115,11 +135,6 @@ class Calibration:
 
     def _told(self) -> list[str]:
         return [name.strip() for name in self.known.split(",") if name.strip()]
-
-    def _everybody(self, atlas: Atlas) -> dict[tuple[str, str], PopulationVisit]:
-        """Twice as many patients as are asked for: not all are inside the observed ranges."""
-        source = atlas.checkpoint.source
-        return visits_of(str(source["population"]), int(source["seed"]) + OTHER_SEED, 2 * self.patients)
 
 
 def _summary(rows: list[list[float]], unit: str, kind: str) -> dict[str, Any]:

@@ -1,0 +1,72 @@
+"""All measures of one shape beside what is usual, as commands tell them."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from naisr_model.atlas import VOLUME_RESOLUTION, Atlas, Individual
+from naisr_model.covariates import Values
+from naisr_model.learning.fitting.posterior import TWO_SIDED_95
+from naisr_model.measures.curves import shapes_along
+from naisr_model.measures.kinds import MEASURES, Surface, measured, surface_of
+from naisr_model.measures.norms import Norms, people_of
+from naisr_model.progress import SILENT, Progress
+
+
+def norms_of(atlas: Atlas, *, progress: Progress = SILENT) -> Norms:
+    """What is usual among the people of an atlas; takes half a minute.
+
+    Raises:
+        InputError: when they are too few, where the model deforms no template, or where it folds.
+        Cancelled: when nobody waits any more.
+    """
+    template = surface_of(atlas.template(VOLUME_RESOLUTION, progress=progress.quiet))
+    return Norms(atlas, template, people_of(atlas, progress=progress))
+
+
+def measure_record(norms: Norms, covariates: Values, person: Individual | None = None) -> dict[str, Any]:
+    """Every measure of a shape among people of the same covariates, for JSON: mm, cm² and cm³.
+
+    Args:
+        norms: of the atlas.
+        covariates: of the people to compare with, real values by name.
+        person: a fit at these covariates; the population average when left out.
+
+    Returns:
+        ``covariates``, and in ``measures`` by name ``value``, ``unit``, ``definition``, ``median``, ``low``,
+        ``high``, ``percentile`` and ``z``; of what is tube-like the ``sections``; of a person the share of
+        the surface ``outside`` the population's 95 % band.
+
+    Raises:
+        InputError: for an unknown covariate or one out of range.
+    """
+    atlas = norms.atlas
+    (shape,) = shapes_along(atlas, norms.template, [covariates], person)
+    values = {name: value for name, value in measured(shape).items() if name in norms.spreads}
+    found = norms.norms(covariates, values)
+    rows = {
+        name: {"value": values[name], "unit": one.unit, "definition": one.definition, **asdict(found[name])}
+        for name, one in MEASURES.items()
+        if name in found
+    }
+    record: dict[str, Any] = {"covariates": atlas.complete(covariates), "measures": rows}
+    if shape.tube is not None:
+        record["sections"] = _sections(shape)
+    if person is not None:
+        scores = norms.local.scores(atlas, shape.points_mm, covariates)
+        record["outside"] = float(np.mean(np.abs(scores) > TWO_SIDED_95))
+    return record
+
+
+def _sections(shape: Surface) -> dict[str, Any]:
+    assert shape.tube is not None
+    found = shape.tube.sections(shape.points_mm)
+    return {
+        "places_mm": found.places_mm.tolist(),
+        "areas_mm2": found.areas_mm2.tolist(),
+        "centres_mm": found.centres_mm.tolist(),
+        "narrowest_at_mm": float(found.places_mm[found.narrowest]),
+    }

@@ -1,0 +1,116 @@
+"""What is usual, among people who differ as they were told to."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+from eggs import untrained
+from scipy.stats import norm as normal
+
+from naisr_model.atlas import Atlas
+from naisr_model.errors import InputError
+from naisr_model.measures.kinds import MEASURES, VOLUME, surface_of
+from naisr_model.measures.norms import People, dots, local_spread_of, people_of, spread_of
+from naisr_model.measures.report import measure_record, norms_of
+
+SD = 0.05
+"""Of the logarithm of a ball's radius among people of the same age."""
+
+
+@pytest.fixture(scope="module")
+def balls() -> People:
+    """Balls as large in millimetres as people are old, more or less."""
+    template = surface_of(trimesh.creation.icosphere(subdivisions=2, radius=1.0))
+    ages = np.linspace(5.0, 15.0, 40)
+    larger = np.exp(SD * normal.ppf((np.random.default_rng(0).permutation(40) + 0.5) / 40))
+    usual = ages[:, None, None] * template.points_mm
+    rows = tuple({"age": float(age)} for age in ages)
+    return People(rows, template, larger[:, None, None] * usual, usual)
+
+
+def test_the_spread_of_a_measure_is_that_of_the_people(balls):
+    for name, power in (("area", 2), ("volume", 3)):
+        spread = spread_of(balls, MEASURES[name])
+        assert spread.centre == pytest.approx(0, abs=1e-6)
+        assert spread.sd == pytest.approx(power * SD, rel=0.05)
+
+
+def test_a_value_stands_among_people_of_the_same_covariates(balls):
+    spread = spread_of(balls, VOLUME)
+    usual = spread.norm(100.0, 100.0)
+    assert usual.z == pytest.approx(0, abs=1e-6) and usual.percentile == pytest.approx(50)
+    assert usual.median == pytest.approx(100)
+    large = spread.norm(usual.high, 100.0)
+    assert large.z == pytest.approx(1.96, abs=1e-3) and large.percentile == pytest.approx(97.5)
+    assert np.log(usual.high / usual.low) == pytest.approx(2 * 1.96 * 3 * SD, rel=0.05)
+    low, high = spread.band([50.0, 100.0])
+    assert (low[1], high[1]) == pytest.approx((usual.low, usual.high)) and high[0] == pytest.approx(
+        high[1] / 2
+    )
+
+
+def test_percentiles_of_the_people_themselves_are_spread_evenly(balls):
+    spread = spread_of(balls, VOLUME)
+    pairs = zip(balls.own(VOLUME), balls.usual(VOLUME), strict=True)
+    percentiles = np.sort([spread.norm(own, usual).percentile for own, usual in pairs])
+    assert np.abs(percentiles - 100 * (np.arange(40) + 0.5) / 40).max() < 2.5
+
+
+def test_dots_are_as_fine_as_the_template(balls):
+    fine = surface_of(trimesh.creation.icosphere(subdivisions=4, radius=1.0))
+    radii = np.cbrt(dots(balls, VOLUME, fine) * 1000 * 3 / (4 * np.pi))
+    truth = np.linalg.norm(balls.own_mm[:, 0], axis=1)
+    assert radii == pytest.approx(truth, rel=2e-3)
+
+
+def test_the_local_spread_is_that_of_the_radius(balls):
+    shares = local_spread_of(balls).shares * np.cbrt(4 / 3 * np.pi)
+    assert shares == pytest.approx(SD, rel=0.1)
+
+
+def test_what_has_no_norm_is_refused(balls):
+    with pytest.raises(InputError, match="have no length"):
+        spread_of(balls, MEASURES["length"])
+    with pytest.raises(InputError, match="needs a value above 0"):
+        spread_of(balls, VOLUME).norm(0.0, 10.0)
+
+
+def test_a_few_people_are_no_population():
+    with pytest.raises(InputError, match="trained on 5 shapes; what is usual takes 10 or more"):
+        people_of(Atlas(untrained()))
+
+
+@pytest.fixture(scope="module")
+def norms(egg_atlas):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("naisr_model.measures.norms.RESOLUTION", 32)
+        yield norms_of(Atlas.load(egg_atlas))
+
+
+def test_training_people_are_reconstructed(norms):
+    assert len(norms.people.covariates) == 19
+    ages = [values["age"] for values in norms.people.covariates]
+    sexes = [values["sex"] for values in norms.people.covariates]
+    truth = [
+        4 / 3 * np.pi * (20 + 2 * s) * 20 * (20 + 2 * a) / 1000 for a, s in zip(ages, sexes, strict=True)
+    ]
+    assert dots(norms.people, VOLUME, norms.template) == pytest.approx(truth, rel=0.06)
+
+
+def test_a_shape_is_told_among_its_people(norms):
+    record = measure_record(norms, {"age": 6.0, "sex": 1.0})
+    assert record["measures"].keys() == {"volume", "area"} and "outside" not in record
+    volume = record["measures"]["volume"]
+    assert volume["low"] < volume["value"] < volume["high"] and 10 < volume["percentile"] < 90
+    assert record["covariates"] == {"age": 6.0, "sex": 1.0}
+
+
+def test_places_of_the_surface_are_judged_by_their_own_spread(norms):
+    atlas, values = norms.atlas, {"age": 6.0, "sex": 1.0}
+    (points,) = atlas.carried_mm(norms.template.points_mm, [values])
+    sd = norms.local.sd_mm(atlas, points, values)
+    assert sd.shape == (len(points),) and (sd > 0).all() and sd.max() < 1.5
+    outward = points + sd[:, None] * points / np.linalg.norm(points, axis=1, keepdims=True)
+    here, there = (norms.local.scores(atlas, place, values) for place in (points, outward))
+    assert np.median(there - here) == pytest.approx(1, rel=0.15)
