@@ -10,7 +10,7 @@ from naisr_model.cli.options import converted
 
 COMMANDS = (
     *(data.populate, data.prepare),
-    *(patients.fit, patients.transfer, patients.evolve),
+    *(patients.fit, patients.transfer, patients.evolve, patients.measure),
     *(atlases.info, atlases.mesh, benchmarking.bench),
 )
 

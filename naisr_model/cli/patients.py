@@ -1,8 +1,9 @@
-"""Commands about one patient's shape: ``fit``, ``transfer`` and ``evolve``."""
+"""Commands about one patient's shape: ``fit``, ``transfer``, ``evolve`` and ``measure``."""
 
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -24,25 +25,36 @@ PatientFile = Annotated[
 
 @Parameter(name="*")
 @dataclasses.dataclass(frozen=True)
-class IntakeOptions:
+class ReadingOptions:
     """How a patient's file is read.
 
     Attributes:
-        known: covariates of the scan, as age=84,weight=20.4,sex=M; the others are inferred.
         label: which label of a volume, its number or its name.
         scale: millimetres per unit of the file; left out, it is guessed where the size is implausible.
         align: none, icp or landmarks; onto the atlas's shape at the known covariates.
         landmarks: CSV name,x,y,z in the coordinates of the file.
     """
 
-    known: str = ""
     label: str | None = None
     scale: float | None = None
     align: Literal["none", "icp", "landmarks"] = "none"
     landmarks: Path | None = None
 
 
+@Parameter(name="*")
+@dataclasses.dataclass(frozen=True)
+class IntakeOptions(ReadingOptions):
+    """How a patient's file is read, and what is known of the patient.
+
+    Attributes:
+        known: covariates of the scan, as age=84,weight=20.4,sex=M; the others are inferred.
+    """
+
+    known: str = ""
+
+
 _AS_IT_IS = IntakeOptions()
+_AS_IT_LIES = ReadingOptions()
 
 
 def fit(
@@ -129,6 +141,53 @@ def evolve(
     require_way(loaded, *way)  # refused before the fit
     fitted, intake = _forecastable(patient, loaded, reading)
     _tell_series(fitted, intake, evolution(fitted, *way), patient, out, json_file)
+
+
+def measure(
+    atlas: AtlasFile,
+    *,
+    scan: Annotated[
+        Path | None,
+        Parameter(help="whom to measure: a file as 'naisr fit' takes it; the average without one."),
+    ] = None,
+    set: Annotated[
+        list[str] | None,
+        Parameter(
+            name="--set",
+            help="a covariate's value in real units, as age=120; left out, it is at the population centre, "
+            "or inferred from the scan.",
+        ),
+    ] = None,
+    reading: ReadingOptions = _AS_IT_LIES,
+    json_file: JsonFile = None,
+) -> None:
+    """Measure a shape: volume, area, length and cross-sections, among people of the same covariates."""
+    from naisr_model.covariates import read_values
+    from naisr_model.measures.report import measure_record, norms_of
+
+    if scan is None and reading != _AS_IT_LIES:
+        raise InputError("--label, --scale, --align and --landmarks tell how a scan is read; add --scan FILE")
+    loaded = _loaded(atlas)
+    if not loaded.capabilities.deformable:
+        raise InputError(f"{loaded.model_title} deforms no template, which 'naisr measure' needs")
+    values = read_values("--set", set or [], loaded.covariates)
+    loaded.complete(values)  # refused before the work
+    fitted = None
+    if scan is not None:
+        known = IntakeOptions(known=",".join(set or []), **dataclasses.asdict(reading))
+        fitted, _ = _forecastable(scan, loaded, known)
+        values = {name: _inside(loaded, name, value) for name, value in fitted.covariates.items()}
+    with bar("measuring") as progress:
+        norms = norms_of(loaded, progress=progress)
+    record = measure_record(norms, values, None if fitted is None else fitted.individual)
+    write_json(json_file, record)
+    _tell_measures(record, loaded.covariates, fitted)
+
+
+def _inside(atlas: Any, name: str, value: float) -> float:
+    """A fitted covariate, to rounding within its observed range."""
+    low, high = next(covariate.range for covariate in atlas.covariates if covariate.name == name)
+    return min(max(value, low), high)
 
 
 def _require_own(out: Path | None, patient: Path) -> None:
@@ -224,3 +283,29 @@ def _tell_series(
         low, high = record["volume_low_cm3"], record["volume_high_cm3"]
         print(f"{where}: {record['volume_cm3']:.1f} cm³ ({low:.1f} to {high:.1f})")
     print(f"at other covariates {100 * fitted.lasting:.0f} % of what sets the patient apart is kept")
+
+
+def _tell_measures(record: Mapping[str, Any], covariates: Iterable[Covariate], fitted: Any) -> None:
+    """A table, and with whom the shape is compared."""
+    from naisr_model.measures.kinds import MEASURES
+
+    whose, among = ("average", "") if fitted is None else ("patient", "percentile")
+    print(f"{'':24}{whose:>14}  {'95 % of people have':26}{among}".rstrip())
+    for name, row in record["measures"].items():
+        value, low, high = (_short(row[key]) for key in ("value", "low", "high"))
+        usual, place = f"{low} to {high} {row['unit']}", f"{row['percentile']:.0f}" if among else ""
+        print(f"{MEASURES[name].title:24}{f'{value} ' + row['unit']:>14}  {usual:26}{place}".rstrip())
+    if "sections" in record:
+        print(f"narrowest {record['sections']['narrowest_at_mm']:.0f} mm from the upper end")
+    if fitted is not None:
+        print(f"{100 * record['outside']:.1f} % of the surface lies outside the band of 95 % of people")
+        print(f"measured on the fit, which is {fitted.residual_mm:.2f} mm from the scan on average")
+    print(f"people: {_row(covariates, record['covariates'])}")
+    if fitted is not None and fitted.inferred:
+        names = ", ".join(fitted.inferred)
+        print(f"inferred from the scan itself: {names}; the people are those that it looks like")
+
+
+def _short(value: float) -> str:
+    """A positive number with three digits that count, or all before the point."""
+    return f"{value:,.{max(0, 2 - math.floor(math.log10(value)))}f}"
