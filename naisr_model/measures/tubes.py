@@ -38,6 +38,12 @@ nasal passages 3."""
 LEAST_SLENDERNESS = 3.0
 """Of the length to the mean diameter."""
 
+LEAST_FACES = 50
+"""Of what may be a tube."""
+
+LEAST_AREA = 1e-9
+"""Of the mean triangle's; a smaller one has no angles."""
+
 Points = NDArray[np.floating]
 
 
@@ -116,12 +122,20 @@ def tube_of(mesh: trimesh.Trimesh) -> Tube | None:
     Args:
         mesh: any unit.
     """
-    faces = _largest_piece(np.asarray(mesh.faces, dtype=np.int64))
-    coordinate = _coordinate(np.asarray(mesh.vertices, dtype=np.float64), faces) if len(faces) else None
+    points = np.asarray(mesh.vertices, dtype=np.float64)
+    faces = _largest_piece(_sound(points, np.asarray(mesh.faces, dtype=np.int64)))
+    coordinate = _coordinate(points, faces) if len(faces) >= LEAST_FACES else None
     if coordinate is None:
         return None
-    tube = _even(np.asarray(mesh.vertices), faces, coordinate)
-    return tube if _is_slender(tube.sections(mesh.vertices)) else None
+    tube = _even(points, faces, coordinate)
+    return tube if _is_slender(tube.sections(points)) else None
+
+
+def _sound(points: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Those that have an area."""
+    a, b, c = (points[faces[:, corner]] for corner in range(3))
+    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    return faces[areas > LEAST_AREA * areas[np.isfinite(areas)].mean()] if len(faces) else faces
 
 
 def _is_slender(sections: Sections) -> bool:
@@ -145,7 +159,10 @@ def _coordinate(points: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArra
     mass = igl.massmatrix(own, faces, igl.MASSMATRIX_TYPE_VORONOI)
     scale = stiffness.diagonal().mean() / mass.diagonal().mean()
     start = np.ones(len(own)) + own[:, 0] / max(float(np.ptp(own[:, 0])), 1e-12)
-    values, waves = eigsh(stiffness, k=3, M=mass, sigma=-1e-6 * scale, v0=start)
+    try:
+        values, waves = eigsh(stiffness, k=3, M=mass, sigma=-1e-6 * scale, v0=start)
+    except RuntimeError:  # a crumpled surface has no Laplacian to speak of
+        return None
     if not values[2] >= LEAST_RATIO * values[1] > 0:
         return None
     wave = waves[:, 1] * np.sign(own[waves[:, 1].argmin(), 2] - own[waves[:, 1].argmax(), 2] or 1.0)

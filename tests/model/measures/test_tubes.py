@@ -106,16 +106,27 @@ def test_a_tube_may_be_open():
     assert sections(tube).areas_mm2 == pytest.approx(25 * CIRCLE, rel=1e-3)
 
 
+def test_a_triangle_without_area_does_not_count():
+    tube = straight(np.full(101, 5.0))
+    pinched = trimesh.Trimesh(tube.vertices, np.vstack([tube.faces, [[500, 501, 501]]]), process=False)
+    assert sections(pinched).length_mm == pytest.approx(100, rel=1e-3)
+
+
+SOUP = straight(np.full(101, 5.0)).triangles
+
+
 @pytest.mark.parametrize(
     "mesh",
     [
+        trimesh.Trimesh(SOUP.reshape(-1, 3), np.arange(3 * len(SOUP)).reshape(-1, 3), process=False),
+        trimesh.Trimesh(np.zeros((60, 3)), np.arange(60).reshape(-1, 3), process=False),
         trimesh.creation.icosphere(subdivisions=3, radius=10),
         trimesh.creation.torus(20, 3),
         trimesh.creation.box([10, 10, 20]).subdivide().subdivide().subdivide(),
         egg(9, -1),
         trimesh.Trimesh(),
     ],
-    ids=["a ball", "a closed ring", "a box", "an egg", "nothing"],
+    ids=["triangles that are not joined", "a point", "a ball", "a closed ring", "a box", "an egg", "nothing"],
 )
 def test_what_is_no_tube(mesh):
     assert tube_of(mesh) is None
