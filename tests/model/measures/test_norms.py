@@ -11,7 +11,7 @@ from scipy.stats import norm as normal
 from naisr_model.atlas import Atlas
 from naisr_model.errors import InputError
 from naisr_model.measures.kinds import MEASURES, VOLUME, surface_of
-from naisr_model.measures.norms import People, dots, local_spread_of, people_of, spread_of
+from naisr_model.measures.norms import WIDENING, People, dots, local_spread_of, people_of, spread_of
 from naisr_model.measures.report import measure_record, norms_of
 
 SD = 0.05
@@ -33,7 +33,7 @@ def test_the_spread_of_a_measure_is_that_of_the_people(balls):
     for name, power in (("area", 2), ("volume", 3)):
         spread = spread_of(balls, MEASURES[name])
         assert spread.centre == pytest.approx(0, abs=1e-6)
-        assert spread.sd == pytest.approx(power * SD, rel=0.05)
+        assert spread.sd == pytest.approx(WIDENING * power * SD, rel=0.05)
 
 
 def test_a_value_stands_among_people_of_the_same_covariates(balls):
@@ -43,7 +43,7 @@ def test_a_value_stands_among_people_of_the_same_covariates(balls):
     assert usual.median == pytest.approx(100)
     large = spread.norm(usual.high, 100.0)
     assert large.z == pytest.approx(1.96, abs=1e-3) and large.percentile == pytest.approx(97.5)
-    assert np.log(usual.high / usual.low) == pytest.approx(2 * 1.96 * 3 * SD, rel=0.05)
+    assert np.log(usual.high / usual.low) == pytest.approx(2 * 1.96 * WIDENING * 3 * SD, rel=0.05)
     low, high = spread.band([50.0, 100.0])
     assert (low[1], high[1]) == pytest.approx((usual.low, usual.high)) and high[0] == pytest.approx(
         high[1] / 2
@@ -53,8 +53,8 @@ def test_a_value_stands_among_people_of_the_same_covariates(balls):
 def test_percentiles_of_the_people_themselves_are_spread_evenly(balls):
     spread = spread_of(balls, VOLUME)
     pairs = zip(balls.own(VOLUME), balls.usual(VOLUME), strict=True)
-    percentiles = np.sort([spread.norm(own, usual).percentile for own, usual in pairs])
-    assert np.abs(percentiles - 100 * (np.arange(40) + 0.5) / 40).max() < 2.5
+    scores = np.sort([WIDENING * spread.norm(own, usual).z for own, usual in pairs])
+    assert np.abs(normal.cdf(scores) - (np.arange(40) + 0.5) / 40).max() < 0.025
 
 
 def test_dots_are_as_fine_as_the_template(balls):
@@ -66,7 +66,7 @@ def test_dots_are_as_fine_as_the_template(balls):
 
 def test_the_local_spread_is_that_of_the_radius(balls):
     shares = local_spread_of(balls).shares * np.cbrt(4 / 3 * np.pi)
-    assert shares == pytest.approx(SD, rel=0.1)
+    assert shares == pytest.approx(WIDENING * SD, rel=0.1)
 
 
 def test_what_has_no_norm_is_refused(balls):
