@@ -176,18 +176,12 @@ def measure(
     if scan is not None:
         known = IntakeOptions(known=",".join(set or []), **dataclasses.asdict(reading))
         fitted, _ = _forecastable(scan, loaded, known)
-        values = {name: _inside(loaded, name, value) for name, value in fitted.covariates.items()}
+        values = fitted.covariates
     with bar("measuring") as progress:
         norms = norms_of(loaded, progress=progress)
     record = measure_record(norms, values, None if fitted is None else fitted.individual)
     write_json(json_file, record)
     _tell_measures(record, loaded.covariates, fitted)
-
-
-def _inside(atlas: Any, name: str, value: float) -> float:
-    """A fitted covariate, to rounding within its observed range."""
-    low, high = next(covariate.range for covariate in atlas.covariates if covariate.name == name)
-    return min(max(value, low), high)
 
 
 def _require_own(out: Path | None, patient: Path) -> None:
@@ -292,13 +286,14 @@ def _tell_measures(record: Mapping[str, Any], covariates: Iterable[Covariate], f
     whose, among = ("average", "") if fitted is None else ("patient", "percentile")
     print(f"{'':24}{whose:>14}  {'95 % of people have':26}{among}".rstrip())
     for name, row in record["measures"].items():
-        value, low, high = (_short(row[key]) for key in ("value", "low", "high"))
+        value, low, high = (_three_digits(row[key]) for key in ("value", "low", "high"))
         usual, place = f"{low} to {high} {row['unit']}", f"{row['percentile']:.0f}" if among else ""
         print(f"{MEASURES[name].title:24}{f'{value} ' + row['unit']:>14}  {usual:26}{place}".rstrip())
     if "sections" in record:
         print(f"narrowest {record['sections']['narrowest_at_mm']:.0f} mm from the upper end")
-    if fitted is not None:
+    if "outside" in record:
         print(f"{100 * record['outside']:.1f} % of the surface lies outside the band of 95 % of people")
+    if fitted is not None:
         print(f"measured on the fit, which is {fitted.residual_mm:.2f} mm from the scan on average")
     print(f"people: {_row(covariates, record['covariates'])}")
     if fitted is not None and fitted.inferred:
@@ -306,6 +301,6 @@ def _tell_measures(record: Mapping[str, Any], covariates: Iterable[Covariate], f
         print(f"inferred from the scan itself: {names}; the people are those that it looks like")
 
 
-def _short(value: float) -> str:
+def _three_digits(value: float) -> str:
     """A positive number with three digits that count, or all before the point."""
     return f"{value:,.{max(0, 2 - math.floor(math.log10(value)))}f}"

@@ -9,9 +9,23 @@ from numpy.typing import NDArray
 
 from naisr_model.atlas import Atlas, Individual
 from naisr_model.covariates import Values, normalised_vector
-from naisr_model.measures.kinds import Measure, Surface
+from naisr_model.errors import InputError
+from naisr_model.measures.kinds import Measure, Surface, surface_of
 from naisr_model.progress import SILENT, Progress
 from naisr_model.surface.tracking import Tracked, Tracker
+
+
+def template_of(atlas: Atlas, resolution: int, *, progress: Progress = SILENT) -> Surface:
+    """The template of an atlas, with stations where it is tube-like.
+
+    Raises:
+        InputError: where the model deforms none, or it has no surface.
+        Cancelled: when nobody waits any more.
+    """
+    mesh = atlas.template(resolution, progress=progress)
+    if not len(mesh.faces):
+        raise InputError("the template of the atlas has no surface; train the atlas for longer")
+    return surface_of(mesh)
 
 
 def along(covariates: Values, name: str, values: Iterable[float]) -> list[dict[str, float]]:

@@ -25,8 +25,8 @@ from naisr_model.atlas import Atlas
 from naisr_model.covariates import Values
 from naisr_model.errors import InputError
 from naisr_model.learning.fitting.posterior import TWO_SIDED_95
-from naisr_model.measures.curves import curve, shapes_along
-from naisr_model.measures.kinds import MEASURES, VOLUME, Measure, Surface, surface_of
+from naisr_model.measures.curves import curve, shapes_along, template_of
+from naisr_model.measures.kinds import MEASURES, VOLUME, Measure, Surface
 from naisr_model.progress import SILENT, Progress
 from naisr_model.surface.blending import blended
 
@@ -36,6 +36,9 @@ RESOLUTION = 64
 WIDENING = 1.1
 """Standard deviation among people whom the networks were not fitted to, over that among the training people.
 Chosen over 150 synthetic airways of another seed than those of training and ``naisr evaluate norms``."""
+
+LEAST_DIFFERENCE = 1e-6
+"""Of ratios; below it everybody is alike."""
 
 LEAST_PEOPLE = 10
 """From fewer nothing is said of what is usual."""
@@ -137,7 +140,7 @@ def people_of(atlas: Atlas, *, progress: Progress = SILENT) -> People:
             f"the atlas was trained on {len(codes)} shapes; what is usual takes {LEAST_PEOPLE} or more"
         )
     rows = [population.row(int(index)) for index in np.flatnonzero(~population.held_out)]
-    template = surface_of(atlas.template(RESOLUTION, progress=progress.quiet))
+    template = template_of(atlas, RESOLUTION, progress=progress.quiet)
     usual = atlas.carried_mm(template.points_mm, rows, progress=progress.part(0.0, 0.5))
     own = atlas.carried_mm(template.points_mm, rows, codes, progress=progress.part(0.5, 1.0))
     return People(tuple(rows), template, own, usual)
@@ -147,11 +150,14 @@ def spread_of(people: People, measure: Measure) -> Spread:
     """How a measure differs among people of the same covariates; coarseness cancels out of the ratios.
 
     Raises:
-        InputError: when their shapes have no such measure.
+        InputError: when their shapes have no such measure, or are all alike.
     """
     if not measure.is_possible(people.template):
         raise InputError(f"shapes of this atlas have no {measure.title.lower()}")
-    return Spread(people.own(measure) / people.usual(measure))
+    ratios = people.own(measure) / people.usual(measure)
+    if not (ratios > 0).all() or np.ptp(ratios) < LEAST_DIFFERENCE:
+        raise InputError("the atlas does not tell its people apart, so nothing is usual; train it for longer")
+    return Spread(ratios)
 
 
 def dots(people: People, measure: Measure, template: Surface) -> NDArray[np.float64]:

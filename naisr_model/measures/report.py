@@ -10,8 +10,8 @@ import numpy as np
 from naisr_model.atlas import VOLUME_RESOLUTION, Atlas, Individual
 from naisr_model.covariates import Values
 from naisr_model.learning.fitting.posterior import TWO_SIDED_95
-from naisr_model.measures.curves import shapes_along
-from naisr_model.measures.kinds import MEASURES, Surface, measured, surface_of
+from naisr_model.measures.curves import shapes_along, template_of
+from naisr_model.measures.kinds import MEASURES, Surface, measured
 from naisr_model.measures.norms import Norms, people_of
 from naisr_model.progress import SILENT, Progress
 
@@ -23,7 +23,7 @@ def norms_of(atlas: Atlas, *, progress: Progress = SILENT) -> Norms:
         InputError: when they are too few, where the model deforms no template, or where it folds.
         Cancelled: when nobody waits any more.
     """
-    template = surface_of(atlas.template(VOLUME_RESOLUTION, progress=progress.quiet))
+    template = template_of(atlas, VOLUME_RESOLUTION, progress=progress.quiet)
     return Norms(atlas, template, people_of(atlas, progress=progress))
 
 
@@ -37,8 +37,8 @@ def measure_record(norms: Norms, covariates: Values, person: Individual | None =
 
     Returns:
         ``covariates``, and in ``measures`` by name ``value``, ``unit``, ``definition``, ``median``, ``low``,
-        ``high``, ``percentile`` and ``z``; of what is tube-like the ``sections``; of a person the share of
-        the surface ``outside`` the population's 95 % band.
+        ``high``, ``percentile`` and ``z``; of what is tube-like the ``sections``; of a person's
+        closed surface the share ``outside`` the population's 95 % band.
 
     Raises:
         InputError: for an unknown covariate or one out of range.
@@ -55,7 +55,7 @@ def measure_record(norms: Norms, covariates: Values, person: Individual | None =
     record: dict[str, Any] = {"covariates": atlas.complete(covariates), "measures": rows}
     if shape.tube is not None:
         record["sections"] = _sections(shape)
-    if person is not None:
+    if person is not None and shape.is_closed:
         scores = norms.local.scores(atlas, shape.points_mm, covariates)
         record["outside"] = float(np.mean(np.abs(scores) > TWO_SIDED_95))
     return record

@@ -18,6 +18,7 @@ from numpy.random import Generator
 EITHER = Expected("either")
 ATLAS = "{goods}/atlas.safetensors"
 MESH = ("mesh", ATLAS, f"{OUT}/mean.stl")
+MEASURE = ("measure", ATLAS)
 FIT = ("fit", "egg.stl", "--atlas", ATLAS)
 EVOLVE = ("evolve", "egg.stl", "--atlas", ATLAS, "--known", "age=6,sex=M", "--json", RECORD)
 TRANSFER = ("transfer", "egg.stl", "--atlas", ATLAS, "--known", "age=6,sex=M", "--json", RECORD)
@@ -162,6 +163,12 @@ CASES = (
             ("info", ATLAS, ATLAS),
             ("bench", "egg.stl"),
         )
+    ),
+    *_of(
+        MEASURE,
+        *("--set age=99", "--set age=nan", "--set height=5", "--set age=5 --set age=6", "--set", "extra"),
+        *("--label 1", "--align icp", "--scan gone.stl", "--scan egg.stl --align magic", "--scan table.csv"),
+        *("--scan egg.stl --set age=6,sex=X", "--scan egg.stl --label 1", "--json .", "--known age=6"),
     ),
     *_of(
         FIT,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 import trimesh
@@ -74,6 +76,12 @@ def test_what_has_no_norm_is_refused(balls):
         spread_of(balls, MEASURES["length"])
     with pytest.raises(InputError, match="needs a value above 0"):
         spread_of(balls, VOLUME).norm(0.0, 10.0)
+
+
+def test_people_who_are_all_alike_have_no_spread(balls):
+    alike = dataclasses.replace(balls, own_mm=balls.usual_mm)
+    with pytest.raises(InputError, match="does not tell its people apart"):
+        spread_of(alike, VOLUME)
 
 
 def test_a_few_people_are_no_population():
