@@ -51,8 +51,8 @@ def shapes_along(
         person: a fit, who is followed with what is expected to last of the code; the population average when
             left out.
         tracker: of that template and of this person, or of the average. With it a shape takes milliseconds
-            instead of a second, and volumes of airways in the first two years are up to 8 % too large (0.8 % in
-            the median over 40 training people); without it the networks themselves say where the vertices are.
+            instead of a second, and volumes of airways in the first two years are up to 8 % too large (0.8 %
+            off in the median over 40 training people). Without it the networks say where the vertices are.
         progress: told the finished share, checked between shapes.
 
     Raises:
