@@ -56,6 +56,7 @@ class Controller(QObject):
     """
 
     travelled = Signal()  # an act was undone or done again
+    changed = Signal(object)  # an ExplorerState, after every act: the present one
 
     def __init__(
         self,
@@ -213,6 +214,7 @@ class Controller(QObject):
         self._window.show_history(self.is_moving or self._timeline.can_undo, self._timeline.can_redo)
         self._preparation.follow(state)
         self.refinement.follow(state, self.is_moving)
+        self.changed.emit(state)
 
     def report(self, kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         """Show an error that nobody expected in the window; its origin goes to the console."""

@@ -10,10 +10,12 @@ from naisr_model.progress import Progress
 from naisr_viewer.control.worker import Deliver, Job
 from naisr_viewer.engine.clinic import Clinic
 from naisr_viewer.engine.engine import Engine
+from naisr_viewer.engine.ledgers import ledger, origin_mm
 from naisr_viewer.files.exports import Planned
 from naisr_viewer.files.surfaces import require_writable, write_surface
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.patients import Fitted, Labels, Named, Reading, Scan
+from naisr_viewer.state.pins import Ledger, LedgerRequest, Point
 from naisr_viewer.state.requests import ExportChoice, SurfaceRequest, SurfaceResult
 
 Surfaces = tuple[SurfaceResult, ...]
@@ -86,3 +88,13 @@ def reading(clinic: Clinic, atlas: Path, wanted: Reading, known: Named) -> Job[S
 def fitting(clinic: Clinic, atlas: Path, scan: Scan, known: Named) -> Job[tuple[Fitted, Scan]]:
     """Fits an open atlas to a scan; hands over what was found, and the scan as it lay for it."""
     return lambda deliver, progress: deliver(clinic.fit(atlas, scan, known, progress))
+
+
+def pinning(engine: Engine, surface: SurfaceRequest, point_mm: Point) -> Job[Point]:
+    """Finds the material point at a point of a surface; hands over where that is on the template."""
+    return lambda deliver, _progress: deliver(origin_mm(engine, surface, point_mm))
+
+
+def telling(engine: Engine, request: LedgerRequest) -> Job[Ledger]:
+    """Finds the pinned places and what moved them."""
+    return lambda deliver, _progress: deliver(ledger(engine, request))

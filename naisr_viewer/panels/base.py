@@ -42,6 +42,7 @@ class PanelKind:
         quantity: what they are, in a file; the name of the kind when left out.
         covariates: whose panels there are, one for each name; one of no covariate when left out.
         is_possible: whether an atlas can show it.
+        is_modelled: whether its surface is the shape model's, in which material points can be found.
     """
 
     name: str
@@ -56,6 +57,7 @@ class PanelKind:
     quantity: str = ""
     covariates: Callable[[AtlasCard], tuple[str, ...]] = lambda _: ("",)
     is_possible: Callable[[AtlasCard], bool] = lambda _: True
+    is_modelled: bool = True
 
     @property
     def array(self) -> str:

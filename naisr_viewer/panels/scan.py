@@ -46,4 +46,5 @@ KIND = PanelKind(
     colour="#b9b2a6",
     scale="signed",
     quantity="distance",
+    is_modelled=False,
 )

@@ -107,6 +107,7 @@ def make_window(
     from naisr_viewer.control.atlas_watch import AtlasWatch
     from naisr_viewer.control.controller import Controller
     from naisr_viewer.control.desk import PatientDesk
+    from naisr_viewer.control.pinning import PinDesk
     from naisr_viewer.control.preferences import Preferences
     from naisr_viewer.control.worker import Worker
     from naisr_viewer.engine.clinic import Clinic
@@ -120,6 +121,7 @@ def make_window(
     controller = Controller(window, engine, Worker(), Worker(), Preferences(settings), is_attended)
     PatientDesk(window, controller, Clinic(engine))  # the controller owns it
     AtlasWatch(controller)  # and this
+    PinDesk(window, controller, engine, Worker(), Worker())  # and this
     return window, controller
 
 

@@ -10,6 +10,7 @@ from naisr_model.covariates import growth_path
 from naisr_viewer.state.atlas_card import AtlasCard, RealVector
 from naisr_viewer.state.layouts import Layout
 from naisr_viewer.state.patients import Fitted, Named, OpenScan
+from naisr_viewer.state.pins import Pin
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,7 @@ class ExplorerState:
         patient: key of the one that is shown; None for the population average.
         compared: key of the one that is compared with; None for the patient as fitted.
         has_ghost: whether the scan is drawn over the full shape.
+        pins: places that are marked in all shapes, and told of.
         is_atlas_changed: whether the file of the atlas has changed on the disk since it was read.
     """
 
@@ -36,6 +38,7 @@ class ExplorerState:
     patient: int | None = None
     compared: int | None = None
     has_ghost: bool = True
+    pins: tuple[Pin, ...] = ()
     is_atlas_changed: bool = False
 
     @property

@@ -64,7 +64,7 @@ def persons(history: History, now: ExplorerState) -> frozenset[int]:
 
 def _work(state: ExplorerState) -> object:
     """What undo brings back; how it is looked at is not work."""
-    return state.values, state.patients, state.patient, state.compared
+    return state.values, state.patients, state.patient, state.compared, state.pins
 
 
 def _with_work(now: ExplorerState, wanted: ExplorerState, left: ExplorerState) -> ExplorerState:
@@ -77,6 +77,7 @@ def _with_work(now: ExplorerState, wanted: ExplorerState, left: ExplorerState) -
             patients=wanted.patients,
             patient=wanted.patient,
             compared=wanted.compared,
+            pins=wanted.pins,
             layout=layout,
         )
     )

@@ -32,6 +32,7 @@ class Fact(Enum):
     FORECAST = auto()  # and so well that it can be shown at other covariates
     PAST = auto()  # an act can be undone
     FUTURE = auto()  # one that was undone can be redone
+    PINS = auto()  # places are pinned
 
 
 class Window(Protocol):
@@ -43,6 +44,7 @@ class Window(Protocol):
     redo_requested: SignalInstance
     layout_requested: SignalInstance
     theme_requested: SignalInstance
+    unpin_requested: SignalInstance
     about_requested: SignalInstance
     preferences_requested: SignalInstance
 
@@ -214,6 +216,15 @@ COMMANDS = (
         offered=lambda atlas: bool(atlas.covariates),
     ),
     Command(
+        "unpin",
+        "Remove pins",
+        lambda window: window.unpin_requested.emit(),
+        keys=("Esc",),
+        tip="Remove the pinned places; a click on a shape pins one",
+        needs=frozenset({Fact.PINS}),
+        offered=lambda atlas: atlas.capabilities.trackable,
+    ),
+    Command(
         "preferences",
         "Preferences…",
         lambda window: window.preferences_requested.emit(),
@@ -258,7 +269,7 @@ def _names(commands: Sequence[Command]) -> tuple[str, ...]:
 
 MENUS = {
     "&File": ("open atlas", "open scan", RECENT, SEPARATOR, "export", "screenshot", SEPARATOR, "quit"),
-    "&Edit": ("undo", "redo", "reset all", SEPARATOR, "preferences"),
+    "&Edit": ("undo", "redo", "reset all", "unpin", SEPARATOR, "preferences"),
     "&View": (
         *_names(LAYOUTS), "patients", SEPARATOR, "reset camera", *_names(LOOKS), SEPARATOR, *_names(THEMES),
     ),
@@ -329,6 +340,7 @@ def facts(state: ExplorerState, is_at_rest: bool, can_undo: bool, can_redo: bool
         Fact.FORECAST: state.can_forecast,
         Fact.PAST: can_undo,
         Fact.FUTURE: can_redo,
+        Fact.PINS: bool(state.pins),
     }
     return {fact for fact, is_so in holds.items() if is_so}
 

@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 from naisr_viewer.views.changed_bar import ChangedBar
 from naisr_viewer.views.empty_page import EmptyPage
 from naisr_viewer.views.error_bar import ErrorBar
+from naisr_viewer.views.ledger import LedgerDrawer
 
 FULL_WIDTH_PX = 540
 """A narrower window takes from the panels as well as from the shapes."""
@@ -26,6 +27,7 @@ class Centre(QWidget):
         self.errors = ErrorBar(self)
         self.changed = ChangedBar(self)
         self.empty = EmptyPage(self)
+        self.ledger = LedgerDrawer(self)
         self._shapes = shapes
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         column = QVBoxLayout(self)
@@ -35,6 +37,7 @@ class Centre(QWidget):
         column.addWidget(self.changed)
         column.addWidget(self.empty, 1)
         column.addWidget(shapes, 1)
+        column.addWidget(self.ledger)
         self.show_shapes(False)
 
     def sizeHint(self) -> QSize:

@@ -11,6 +11,9 @@ from naisr_viewer.views.theme import Theme
 COVARIATE_COLOURS = ("#e29a3b", "#4fae86", "#c0699f", "#46a9bd", "#d0694f", "#8f7fd6", "#a7a042", "#7f8ea6")
 """Told apart by colour-blind eyes as far as eight colours can be; repeated beyond eight."""
 
+PIN_COLOURS = ("#d6246e", "#1f6fd6", "#4b2a8c")
+"""Of the first, second and third pinned place; told from the shapes and from one another."""
+
 SCALE_COLOURS: dict[Scale, tuple[str, ...]] = {
     "signed": (
         "#2957a8", "#4379c4", "#6b9bd3", "#9bb9d8", "#d1d5d8", "#d7b092", "#d3885a", "#c55f28", "#aa3600",
@@ -32,6 +35,11 @@ def covariate_colour(atlas: AtlasCard, name: str) -> str:
 def panel_colour(atlas: AtlasCard, panel: Panel) -> str:
     """The colour of a panel's surface, where its vertices have none of their own."""
     return kind_of(panel).colour or covariate_colour(atlas, panel.covariate)
+
+
+def pin_colour(number: int) -> str:
+    """The colour of a pinned place, on the shapes and where it is told of."""
+    return PIN_COLOURS[(number - 1) % len(PIN_COLOURS)]
 
 
 def ghost_colour(theme: Theme) -> str:

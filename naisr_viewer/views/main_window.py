@@ -13,6 +13,7 @@ from naisr_model.shipped import shipped
 from naisr_viewer.panels.kinds import visible_panels
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.patients import Labels
+from naisr_viewer.state.pins import Ledger
 from naisr_viewer.state.questions import Answer, Question
 from naisr_viewer.state.theme import ThemeChoice
 from naisr_viewer.views.actions import (
@@ -27,6 +28,7 @@ from naisr_viewer.views.actions import (
     offer,
 )
 from naisr_viewer.views.centre import Centre
+from naisr_viewer.views.colours import pin_colour
 from naisr_viewer.views.covariates.panel import CovariatePanel
 from naisr_viewer.views.dialogs.about import about
 from naisr_viewer.views.dialogs.documents import DocumentWindow
@@ -72,6 +74,7 @@ class MainWindow(QMainWindow):
     undo_requested = Signal()  # Edit > Undo
     redo_requested = Signal()  # Edit > Redo
     layout_requested = Signal(object)  # a Layout from the View menu or the toolbar
+    unpin_requested = Signal()  # Edit > Remove pins, or the cross of the drawer
     theme_requested = Signal(object)  # a ThemeChoice from the View menu
     cancel_requested = Signal()  # the cancel button beside the progress bar
     about_requested = Signal()  # Help > About
@@ -147,13 +150,21 @@ class MainWindow(QMainWindow):
     @property
     def _stops(self) -> list[QWidget]:
         """What the Tab key goes through, as it is read: the panels from left to right, then what is below."""
-        centre = [*self._centre.stops, self.shapes.row_bar]
+        centre = [*self._centre.stops, self.shapes.row_bar, *self._centre.ledger.stops]
         return [*self.covariates.stops, *centre, *self.patients.stops, self.cancel]
 
     def show_history(self, can_undo: bool, can_redo: bool) -> None:
         """Enable what can be undone and redone."""
         self._can_undo, self._can_redo = can_undo, can_redo
         self._enable()
+
+    def show_ledger(self, ledger: Ledger | None) -> None:
+        """Mark the pinned places on the shapes and tell what moved them; None takes all of it away."""
+        self._centre.ledger.show_ledger(ledger, self._state.atlas)
+        places = () if ledger is None else ledger.places
+        self.shapes.show_marks(
+            {panel: [(point, pin_colour(number)) for number, point in found] for panel, found in places}
+        )
 
     def show_recent(self, paths: Sequence[Path]) -> None:
         """Fill File > Open recent."""
@@ -167,6 +178,7 @@ class MainWindow(QMainWindow):
         self.setStyleSheet(style_sheet(theme))
         self.covariates.set_theme(theme)
         self.shapes.set_theme(theme)
+        self._centre.ledger.set_theme(theme)
         self.scale.update()
         self._actions[f"theme {choice}"].setChecked(True)
 
@@ -312,6 +324,7 @@ class MainWindow(QMainWindow):
         self._recent.file_chosen.connect(self.open_requested)
         self._centre.empty.open_requested.connect(self.ask_atlas)
         self._centre.changed.reopen_requested.connect(self._ask_again)
+        self._centre.ledger.close_requested.connect(self.unpin_requested)
         self.patients.open_requested.connect(self.ask_scan)
         self.cancel.clicked.connect(self.cancel_requested)
         self.shapes.scale_changed.connect(self.scale.set_scale)

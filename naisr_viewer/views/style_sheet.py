@@ -77,6 +77,7 @@ def style_sheet(theme: Theme) -> str:
                 background: {t.raised}; border: 1px solid {t.muted}; border-radius: 2px;
                 width: 12px; height: 12px; }}
     #small {{ padding: 1px 8px; font-size: 9pt; }}
+    #ledger {{ background: {t.window}; border-top: 1px solid {t.line}; }}
     #section {{ font-size: 11pt; font-weight: 600; }}
     #figure {{ font-weight: 600; }}
     #changed {{ background: {t.raised}; border: 1px solid {t.accent}; border-radius: 6px; }}

@@ -49,6 +49,12 @@ def length(mm: float) -> str:
     return f"{mm:,.{digits}f} mm"
 
 
+def way(mm: float) -> str:
+    """How far something moved, and to which side: ``+2.31 mm``, ``−13.5 mm``, ``0.00 mm``."""
+    sign = "" if round(mm, 2) == 0 else "+" if mm > 0 else "−"
+    return f"{sign}{length(abs(mm))}"
+
+
 def duration(seconds: float) -> str:
     """``0.49 s``, ``4.2 s``, ``132 s``."""
     digits = 2 if seconds < 0.995 else 1 if seconds < 9.95 else 0

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QPoint, QPointF, Qt, Signal
 from PySide6.QtGui import QMouseEvent
 from PySide6.QtWidgets import QWidget
 from pyvistaqt import QtInteractor
@@ -15,11 +15,14 @@ from pyvistaqt import QtInteractor
 from naisr_viewer.state.requests import SurfaceResult
 from naisr_viewer.views.shapes.arrangement import Viewport
 from naisr_viewer.views.shapes.camera import Direction, aim, is_any_seen, seen_size
-from naisr_viewer.views.shapes.looks import POINT_PX, as_ghost
-from naisr_viewer.views.shapes.sub_plot import SubPlot, set_colouring, set_points
+from naisr_viewer.views.shapes.looks import POINT_PX, as_ghost, as_marks
+from naisr_viewer.views.shapes.sub_plot import SubPlot, picked, set_colouring, set_points
 
 REST_SAMPLES = 4
 """Multi-sampling at rest; none while something moves, where it costs two thirds of a frame."""
+
+CLICK_PX = 4
+"""A mouse that has gone so far between press and release has turned the shapes."""
 
 
 class Canvas(QtInteractor):
@@ -33,11 +36,13 @@ class Canvas(QtInteractor):
     """
 
     drawn = Signal(int)  # the picture is on its way to the screen; how many sub-plots were drawn anew
+    clicked = Signal(int, object)  # a short click: which sub-plot, and the point (mm) of its surface there
 
     def __init__(self, colours: Sequence[str], parent: QWidget) -> None:
         self._plots: list[SubPlot] = []
         self._ghost_colour = "#000000"
         self._is_moving = self._is_held = False
+        self._pressed: QPoint | None = None
         super().__init__(
             parent, shape=(1, len(colours)), border=False, auto_update=False, multi_samples=REST_SAMPLES
         )
@@ -79,6 +84,19 @@ class Canvas(QtInteractor):
         if plot.ghost is not None:
             plot.ghost.prop.color = self._ghost_colour
             plot.renderer.add_actor(plot.ghost, render=False, reset_camera=False)
+        plot.is_stale = True
+        self.update()
+
+    def set_marks(self, index: int, points_mm: NDArray[np.float32], colours: Sequence[str]) -> None:
+        """Mark places ``[n, 3]`` of a surface with dots of these colours (``#rrggbb``), and no others."""
+        plot = self._plots[index]
+        if plot.marks is None and not len(points_mm):
+            return
+        if plot.marks is not None:
+            plot.renderer.remove_actor(plot.marks, render=False)
+        plot.marks = as_marks(points_mm, colours) if len(points_mm) else None
+        if plot.marks is not None:
+            plot.renderer.add_actor(plot.marks, render=False, reset_camera=False)
         plot.is_stale = True
         self.update()
 
@@ -175,12 +193,16 @@ class Canvas(QtInteractor):
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Draw quickly while the mouse holds the shapes."""
         super().mousePressEvent(event)
+        self._pressed = event.position().toPoint() if event.button() is Qt.MouseButton.LeftButton else None
         self._set_held(True)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         """Draw smoothly again when the mouse lets go of the shapes."""
         super().mouseReleaseEvent(event)
         self._set_held(False)
+        place, pressed, self._pressed = event.position(), self._pressed, None
+        if pressed is not None and (place.toPoint() - pressed).manhattanLength() < CLICK_PX:
+            self._pick(place)
 
     def release(self) -> None:
         """Close the render window for good; nothing is drawn afterwards."""
@@ -188,6 +210,16 @@ class Canvas(QtInteractor):
         self.close()
         self._forget_context()  # Qt deletes context and surface; Python must not know them any longer
         self.deleteLater()
+
+    def _pick(self, place: QPointF) -> None:
+        """Tell what was clicked, where there is a surface."""
+        ratio = self.devicePixelRatioF()
+        x, y = place.x() * ratio, (self.height() - 1 - place.y()) * ratio
+        for index, plot in enumerate(self._plots):
+            if plot.is_shown and plot.renderer.IsInViewport(round(x), round(y)):
+                point_mm = picked(plot, x, y)
+                if point_mm is not None:
+                    self.clicked.emit(index, point_mm)
 
     def _aspect(self, plot: SubPlot) -> float:
         """Width over height of a sub-plot."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
@@ -21,6 +23,9 @@ MATT = {"ambient": 0.45, "diffuse": 0.6, "specular": 0.0}
 POINT_PX = 5
 GHOST_POINT_PX = 3
 """Diameter of the points of a cloud."""
+
+MARK_PX = 11
+"""Diameter of the dot at a marked place."""
 
 GHOST_OPACITY = 0.35
 GHOST_DEPTH = 80.0
@@ -87,4 +92,17 @@ def as_ghost(points_mm: NDArray[np.float32], faces: NDArray[np.int64]) -> pv.Act
     actor.prop.interpolation, actor.prop.ambient, actor.prop.specular = "Phong", 0.5, 0.0
     actor.prop.opacity = GHOST_OPACITY
     actor.prop.culling = "back" if is_closed(faces) else "none"
+    return actor
+
+
+def as_marks(points_mm: NDArray[np.float32], colours: Sequence[str]) -> pv.Actor:
+    """Dots at places ``[n, 3]``, one of each colour (``#rrggbb``)."""
+    dots = pv.PolyData(np.asarray(points_mm, np.float32))
+    dots.point_data["colours"] = np.array([pv.Color(colour).int_rgb for colour in colours], np.uint8)
+    mapper = pv.DataSetMapper(dots)
+    mapper.set_scalars(dots.point_data["colours"], "colours", rgb=True)
+    actor = pv.Actor(mapper=mapper)
+    actor.prop.point_size, actor.prop.render_points_as_spheres = MARK_PX, True
+    actor.prop.lighting = False
+    actor.pickable = False
     return actor

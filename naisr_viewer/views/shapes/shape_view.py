@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 
 NO_FACES = np.zeros((0, 3), np.int64)
 
+Marks = Mapping[Panel, Sequence[tuple[tuple[float, float, float], str]]]
+"""Places (mm) and colours (``#rrggbb``) of the dots on each surface."""
+
 
 class ShapeView(QWidget):
     """Template, effects, full shape and the sub-plots of patients, seen through one camera.
@@ -38,6 +41,7 @@ class ShapeView(QWidget):
 
     scale_changed = Signal(float)  # pixels per millimetre, after zooming or resizing
     drawn = Signal(int)  # the picture is on its way to the screen; how many sub-plots were drawn anew
+    clicked = Signal(object, object)  # a short click on a surface: its Panel, and the point there (mm)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -56,6 +60,7 @@ class ShapeView(QWidget):
         self._grid = Grid(self)
         self._visible: tuple[Panel, ...] = ()
         self._ghost: tuple[NDArray[np.float32] | None, NDArray[np.int64]] = (None, NO_FACES)
+        self._marks: Marks = {}
         self._direction = OBLIQUE
         self._framed = self._looked_after = False
         self._moving = False
@@ -89,7 +94,7 @@ class ShapeView(QWidget):
         self.prepare()
         self._atlas, self._visible = atlas, ()
         self._grid.fill(all_panels(atlas), atlas)
-        self._ghost = (None, NO_FACES)
+        self._ghost, self._marks = (None, NO_FACES), {}
         self._direction = OBLIQUE
         self._theme = theme
         self._open_canvas()
@@ -135,6 +140,12 @@ class ShapeView(QWidget):
         self._ghost = (points_mm, faces)
         if self._canvas is not None:
             self._canvas.set_ghost(self._grid.index(FULL_SHAPE), *self._ghost)
+
+    def show_marks(self, marks: Marks) -> None:
+        """Mark places on surfaces, and no others."""
+        before, self._marks = self._marks, marks
+        for panel in [panel for panel in {**before, **marks} if before.get(panel) != marks.get(panel)]:
+            self._mark(panel)
 
     def set_caption(self, panel: Panel, text: str, hint: str) -> None:
         """The line beneath a sub-plot, and more about it on hover."""
@@ -189,6 +200,7 @@ class ShapeView(QWidget):
         colours = [panel_colour(self._atlas, panel) for panel in self._grid.cells]
         self._canvas = make_canvas(colours, self)
         self._canvas.drawn.connect(self._tell_drawn)
+        self._canvas.clicked.connect(self._tell_clicked)
         self._area.insertWidget(0, self._canvas, 1)
         self._canvas.show()  # the layout would only do so with the next turn of the event loop
         self._canvas.look(*self._direction)
@@ -199,8 +211,19 @@ class ShapeView(QWidget):
             if cell.result is not None:
                 self._canvas.set_surface(index, cell.result)
         self._canvas.set_ghost(self._grid.index(FULL_SHAPE), *self._ghost)
+        for panel in self._marks:
+            self._mark(panel)
         self._arrange()
         self._look_after()
+
+    def _mark(self, panel: Panel) -> None:
+        if self._canvas is not None:
+            places = self._marks.get(panel, ())
+            points_mm = np.array([point_mm for point_mm, _ in places], np.float32).reshape(-1, 3)
+            self._canvas.set_marks(self._grid.index(panel), points_mm, [colour for _, colour in places])
+
+    def _tell_clicked(self, index: int, point_mm: tuple[float, float, float]) -> None:
+        self.clicked.emit(list(self._grid.cells)[index], point_mm)
 
     def _close_canvas(self) -> None:
         if self._canvas is not None:

@@ -20,6 +20,7 @@ class SubPlot:
         mesh: the surface as VTK knows it; its contents are replaced in place.
         result: what ``mesh`` was made from.
         ghost: the look of what lies over the surface.
+        marks: the look of the places that are marked on it.
         is_shown: whether it has a part of the canvas.
         is_stale: whether the canvas shows something else.
     """
@@ -29,6 +30,7 @@ class SubPlot:
     mesh: pv.PolyData
     result: SurfaceResult | None = None
     ghost: pv.Actor | None = None
+    marks: pv.Actor | None = None
     is_shown: bool = False
     is_stale: bool = True
 
@@ -59,3 +61,18 @@ def set_colouring(plot: SubPlot, colouring: Colouring | None) -> None:
         plot.mesh.point_data.set_scalars(colouring.values, "numbers")
         mapper.lookup_table = look_up_table(colouring.limit, colouring.scale)
         mapper.use_lookup_table_scalar_range = True
+
+
+def picked(plot: SubPlot, x: float, y: float) -> tuple[float, float, float] | None:
+    """The point (mm) of a sub-plot's surface that is seen at a pixel of the canvas, counted from below.
+
+    None where that is beside the surface.
+    """
+    picker = pv._vtk.vtkCellPicker()
+    picker.SetTolerance(0.0)
+    picker.PickFromListOn()
+    picker.AddPickList(plot.actor)
+    if not picker.Pick(x, y, 0.0, plot.renderer):
+        return None
+    first, second, third = picker.GetPickPosition()
+    return first, second, third

@@ -1,0 +1,216 @@
+"""Beneath the shapes: what moved each pinned place from the template to where it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QScrollArea, QSizePolicy, QToolButton, QVBoxLayout, QWidget
+
+from naisr_viewer.state.atlas_card import AtlasCard
+from naisr_viewer.state.pins import Entry, Ledger, Part, Pin
+from naisr_viewer.views.colours import covariate_colour, pin_colour
+from naisr_viewer.views.elided import shortened
+from naisr_viewer.views.theme import LIGHT, Theme
+from naisr_viewer.words import ledger as words
+from naisr_viewer.words.numbers import way
+from naisr_viewer.words.titles import as_tip
+
+HEIGHT_PX, FRAME_PX = 170, 6
+TITLE_PX, LINE_PX = 24, 20
+NAME_PX, FIGURE_PX, ALONG_PX = 96, 78, 118
+"""Widths of the name, of the figure and, where there is room, of what is along the surface."""
+
+LEAST_BAR_PX = 48
+WIDEST_PX = 620
+"""Of one place; longer bars would say no more."""
+
+DOT_PX = 10
+LEAST_SCALE_MM = 0.5
+"""Bars of less than that are not blown up to the whole width."""
+
+
+@dataclass(frozen=True)
+class Ink:
+    """What a chart is painted with.
+
+    Attributes:
+        theme: of the window.
+        causes: colour of each covariate, by name.
+    """
+
+    theme: Theme = LIGHT
+    causes: tuple[tuple[str, str], ...] = ()
+
+    def of(self, part: Part) -> QColor:
+        """The colour of a part; grey of what no covariate did."""
+        return QColor(dict(self.causes).get(part.cause, self.theme.muted))
+
+
+class EntryChart(QWidget):
+    """Signed bars of one pinned place.
+
+    Args:
+        pin: which.
+        parent: the widget around it.
+    """
+
+    def __init__(self, pin: Pin, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._pin = pin
+        self._entry: Entry | None = None
+        self._scale_mm, self._ink = LEAST_SCALE_MM, Ink()
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setMaximumWidth(WIDEST_PX)
+
+    def show_entry(self, entry: Entry | None, scale_mm: float, ink: Ink) -> None:
+        """Show what moved the place; None where it has no place.
+
+        Args:
+            entry: what is told.
+            scale_mm: what a bar of half the width stands for.
+            ink: what it is painted with.
+        """
+        self._entry, self._scale_mm, self._ink = entry, scale_mm, ink
+        text = words.NO_PLACE if entry is None else words.told(entry)
+        self.setToolTip(as_tip(f"{text}\n\n{words.HINT}"))
+        self.setAccessibleName(text)
+        self.updateGeometry()
+        self.update()
+
+    def sizeHint(self) -> QSize:
+        """A line for each cause."""
+        count = 1 if self._entry is None else len(words.lines(self._entry))
+        return QSize(NAME_PX + FIGURE_PX + 2 * LEAST_BAR_PX, TITLE_PX + count * LINE_PX)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        """The title with the dot that marks the place on the shapes, and a line for each cause."""
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(pin_colour(self._pin.number)))
+        painter.drawEllipse(QRectF(0, (TITLE_PX - DOT_PX) / 2, DOT_PX, DOT_PX))
+        self._write(painter, QRectF(DOT_PX + 6, 0, self.width(), TITLE_PX), words.title(self._pin.number))
+        if self._entry is None:
+            self._write(painter, QRectF(0, TITLE_PX, self.width(), LINE_PX), words.NO_PLACE, muted=True)
+        else:
+            for row, (name, part) in enumerate(words.lines(self._entry)):
+                self._paint_line(painter, TITLE_PX + row * LINE_PX, name, part)
+        painter.end()
+
+    def _paint_line(self, painter: QPainter, top: float, name: str, part: Part) -> None:
+        along_px = ALONG_PX if self.width() >= NAME_PX + FIGURE_PX + ALONG_PX + 2 * LEAST_BAR_PX else 0
+        right = self.width() - FIGURE_PX - along_px
+        self._write(painter, QRectF(0, top, NAME_PX - 6, LINE_PX), name)
+        self._paint_bar(painter, QRectF(NAME_PX, top, right - NAME_PX - 6, LINE_PX), part)
+        end = Qt.AlignmentFlag.AlignRight
+        self._write(painter, QRectF(right, top, FIGURE_PX, LINE_PX), way(part.normal_mm), side=end)
+        if along_px:
+            box = QRectF(right + FIGURE_PX, top, along_px, LINE_PX)
+            self._write(painter, box, words.along(part), muted=True, side=end)
+
+    def _paint_bar(self, painter: QPainter, box: QRectF, part: Part) -> None:
+        middle, half = box.center().x(), box.width() / 2
+        long_px = half * max(-1.0, min(1.0, part.normal_mm / self._scale_mm))
+        painter.fillRect(
+            QRectF(middle, box.top() + 5, long_px, box.height() - 10).normalized(), self._ink.of(part)
+        )
+        painter.setPen(QPen(QColor(self._ink.theme.muted), 1.0))
+        painter.drawLine(QPointF(middle, box.top() + 2), QPointF(middle, box.bottom() - 2))
+
+    def _write(
+        self,
+        painter: QPainter,
+        box: QRectF,
+        text: str,
+        muted: bool = False,
+        side: Qt.AlignmentFlag = Qt.AlignmentFlag.AlignLeft,
+    ) -> None:
+        painter.setPen(QColor(self._ink.theme.muted if muted else self._ink.theme.text))
+        seen = shortened(text, self.fontMetrics(), round(box.width()))
+        painter.drawText(box, side | Qt.AlignmentFlag.AlignVCenter, seen)
+
+
+class LedgerDrawer(QFrame):
+    """The pinned places beside one another; hidden where there are none."""
+
+    close_requested = Signal()  # the cross was pressed
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("ledger")
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self._theme = LIGHT
+        self._atlas: AtlasCard | None = None
+        self._ledger: Ledger | None = None
+        self.charts: dict[Pin, EntryChart] = {}
+        self._area = QScrollArea(self)
+        self._area.setWidgetResizable(True)
+        self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self._inside = QWidget(self)
+        self._row = QHBoxLayout(self._inside)
+        self._row.setContentsMargins(14, 4, 6, 8)
+        self._row.setSpacing(28)
+        self._row.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self._area.setWidget(self._inside)
+        self.cross = QToolButton(self)
+        self.cross.setText("×")
+        self.cross.setAutoRaise(True)
+        self.cross.setAccessibleName("Remove the pins")
+        self.cross.setToolTip("Remove the pins (Esc)")
+        self.cross.clicked.connect(self.close_requested)
+        outer = QHBoxLayout(self)
+        outer.setContentsMargins(0, 1, 0, 0)
+        outer.addWidget(self._area, 1)
+        corner = QVBoxLayout()
+        corner.addWidget(self.cross)
+        corner.addStretch(1)
+        outer.addLayout(corner)
+        self.hide()
+
+    def sizeHint(self) -> QSize:
+        """As high as its lines; beyond :data:`HEIGHT_PX` they are scrolled."""
+        return QSize(super().sizeHint().width(), min(self._inside.sizeHint().height() + FRAME_PX, HEIGHT_PX))
+
+    @property
+    def stops(self) -> list[QWidget]:
+        """What the Tab key goes through, as it is read."""
+        return [self._area, self.cross]
+
+    def show_ledger(self, ledger: Ledger | None, atlas: AtlasCard | None) -> None:
+        """Show what moved the pinned places; None hides all of it."""
+        self._ledger, self._atlas = ledger, atlas
+        pins = () if ledger is None else ledger.request.pins
+        if tuple(self.charts) != pins:
+            self._make_charts(pins)
+        self._fill()
+        self.setVisible(bool(pins))
+
+    def set_theme(self, theme: Theme) -> None:
+        """Follow the theme."""
+        self._theme = theme
+        self._fill()
+
+    def _make_charts(self, pins: tuple[Pin, ...]) -> None:
+        for chart in self.charts.values():
+            chart.hide()
+            chart.deleteLater()
+        while self._row.count():
+            self._row.takeAt(0)
+        self.charts = {pin: EntryChart(pin, self) for pin in pins}
+        for chart in self.charts.values():
+            self._row.addWidget(chart, 1)
+        self._row.addStretch(0)
+
+    def _fill(self) -> None:
+        if self._ledger is None or self._atlas is None:
+            return
+        atlas, entries = self._atlas, {entry.pin: entry for entry in self._ledger.entries}
+        ink = Ink(
+            self._theme, tuple((one.name, covariate_colour(atlas, one.name)) for one in atlas.covariates)
+        )
+        ways = [abs(part.normal_mm) for entry in entries.values() for _, part in words.lines(entry)]
+        for pin, chart in self.charts.items():
+            chart.show_entry(entries.get(pin), max([LEAST_SCALE_MM, *ways]), ink)
+        self.updateGeometry()

@@ -1,0 +1,38 @@
+"""What moved a pinned place, in words."""
+
+from __future__ import annotations
+
+from naisr_viewer.state.pins import Entry, Part
+from naisr_viewer.words.numbers import length, way
+from naisr_viewer.words.titles import label
+
+PERSON, SUM = "This person", "Together"
+
+HINT = (
+    "How far this place of the full shape has come from the template, cause by cause, along the outward "
+    "normal: + outwards, − inwards. The causes add up."
+)
+NO_PLACE = "The deformation folds at this place: it has no one place in the full shape."
+
+
+def title(number: int) -> str:
+    """Of a pinned place."""
+    return f"Place {number}"
+
+
+def lines(entry: Entry) -> tuple[tuple[str, Part], ...]:
+    """The parts of an entry with what they are called, the sum last."""
+    causes = [(label(part.cause), part) for part in entry.parts]
+    person = [] if entry.person is None else [(PERSON, entry.person)]
+    return (*causes, *person, (SUM, entry.total))
+
+
+def along(part: Part) -> str:
+    """The rest of the way, which the shape's outline does not show."""
+    return f"{length(part.tangential_mm)} along it"
+
+
+def told(entry: Entry) -> str:
+    """All of an entry, for who hovers over it or has it read aloud."""
+    rows = [f"{name}: {way(part.normal_mm)}, {along(part)}" for name, part in lines(entry)]
+    return "\n".join([title(entry.pin.number), *rows])
