@@ -26,6 +26,7 @@ from naisr_viewer.engine.engine import Engine
 from naisr_viewer.files.exports import in_the_way, planned
 from naisr_viewer.panels.kinds import with_layout_of
 from naisr_viewer.state.atlas_card import AtlasCard
+from naisr_viewer.state.drawer import Tab
 from naisr_viewer.state.explorer import ExplorerState, followed, opened, reset, reset_all, with_value
 from naisr_viewer.state.layouts import Layout, Panel
 from naisr_viewer.state.questions import CLOSE_WINDOW, OPEN_ATLAS
@@ -190,6 +191,10 @@ class Controller(QObject):
         """Show other sub-plots."""
         self.go(replace(self.state, layout=layout))
 
+    def set_drawer(self, tab: Tab | None) -> None:
+        """Open a page beneath the shapes; None, or the page that is open, closes it."""
+        self.go(replace(self.state, drawer=None if tab is self.state.drawer else tab))
+
     def set_follow(self, follow: bool) -> None:
         """Whether the other covariates follow the one that is moved."""
         self.go(replace(self.state, follow=follow))
@@ -235,6 +240,7 @@ class Controller(QObject):
         window.undo_requested.connect(self.undo)
         window.redo_requested.connect(self.redo)
         window.layout_requested.connect(self.set_layout)
+        window.drawer_requested.connect(self.set_drawer)
         window.theme_requested.connect(self.set_theme)
         window.cancel_requested.connect(self.refinement.cancel)
         window.about_requested.connect(lambda: window.show_about(__version__))

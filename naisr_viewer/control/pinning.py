@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 
 from PySide6.QtCore import QObject
@@ -13,9 +12,9 @@ from naisr_viewer.control.controller import Controller
 from naisr_viewer.control.worker import Worker
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.panels.pins import can_pin, ledger_request
-from naisr_viewer.state.explorer import ExplorerState
+from naisr_viewer.state.explorer import ExplorerState, pinned, without_pins
 from naisr_viewer.state.layouts import Panel
-from naisr_viewer.state.pins import Ledger, LedgerRequest, Point, with_pin
+from naisr_viewer.state.pins import Ledger, LedgerRequest, Point
 from naisr_viewer.state.requests import SurfaceResult
 from naisr_viewer.views.main_window import MainWindow
 from naisr_viewer.words.numbers import in_words
@@ -55,7 +54,7 @@ class PinDesk(QObject):
 
     def unpin(self) -> None:
         """Take all pins away."""
-        self._controller.commit(replace(self._controller.state, pins=()))
+        self._controller.commit(without_pins(self._controller.state))
 
     def follow(self, state: ExplorerState) -> None:
         """Tell of the pins as the shapes are now."""
@@ -77,7 +76,7 @@ class PinDesk(QObject):
         """Unless another atlas was opened meanwhile."""
         state = self._controller.state
         if state.atlas is not None and state.atlas.path == surface.request.atlas:
-            self._controller.commit(replace(state, pins=with_pin(state.pins, origin_mm)))
+            self._controller.commit(pinned(state, origin_mm))
 
     def _tell(self, ledger: Ledger) -> None:
         """Of the pins that there are; on the way, of where the shapes have just been."""

@@ -8,9 +8,10 @@ import numpy as np
 
 from naisr_model.covariates import growth_path
 from naisr_viewer.state.atlas_card import AtlasCard, RealVector
+from naisr_viewer.state.drawer import Tab, tabs_of
 from naisr_viewer.state.layouts import Layout
 from naisr_viewer.state.patients import Fitted, Named, OpenScan
-from naisr_viewer.state.pins import Pin
+from naisr_viewer.state.pins import Pin, Point, with_pin
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,7 @@ class ExplorerState:
         compared: key of the one that is compared with; None for the patient as fitted.
         has_ghost: whether the scan is drawn over the full shape.
         pins: places that are marked in all shapes, and told of.
+        drawer: the page that is open beneath the shapes; None where it is closed.
         is_atlas_changed: whether the file of the atlas has changed on the disk since it was read.
     """
 
@@ -39,6 +41,7 @@ class ExplorerState:
     compared: int | None = None
     has_ghost: bool = True
     pins: tuple[Pin, ...] = ()
+    drawer: Tab | None = None
     is_atlas_changed: bool = False
 
     @property
@@ -98,7 +101,10 @@ class ExplorerState:
 def opened(state: ExplorerState, atlas: AtlasCard) -> ExplorerState:
     """``atlas`` at its population mean, without patients."""
     layout = Layout.SIDE_BY_SIDE if state.layout.needs_fit else state.layout
-    return ExplorerState(atlas, atlas.centre, layout, follow=state.follow, has_ghost=state.has_ghost)
+    drawer = state.drawer if state.drawer in tabs_of(atlas) else None
+    return ExplorerState(
+        atlas, atlas.centre, layout, follow=state.follow, has_ghost=state.has_ghost, drawer=drawer
+    )
 
 
 def with_value(state: ExplorerState, name: str, value: float) -> ExplorerState:
@@ -158,6 +164,16 @@ def showing(state: ExplorerState, key: int | None) -> ExplorerState:
     for name, value in state.shown.known if state.shown and not state.fit else ():
         state = with_value(state, name, value)
     return state
+
+
+def pinned(state: ExplorerState, origin_mm: Point) -> ExplorerState:
+    """One more place pinned, told of beneath the shapes unless something else is open there."""
+    return replace(state, pins=with_pin(state.pins, origin_mm), drawer=state.drawer or Tab.POINT)
+
+
+def without_pins(state: ExplorerState) -> ExplorerState:
+    """No place pinned, and nothing told of any."""
+    return replace(state, pins=(), drawer=None if state.drawer is Tab.POINT else state.drawer)
 
 
 def with_possible_layout(state: ExplorerState) -> ExplorerState:

@@ -14,6 +14,7 @@ from PySide6.QtWidgets import QMenu, QToolBar, QWidget
 
 from naisr_viewer.panels.kinds import layouts_of
 from naisr_viewer.state.atlas_card import AtlasCard
+from naisr_viewer.state.drawer import Tab, tabs_of
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Layout
 from naisr_viewer.state.theme import ThemeChoice
@@ -45,6 +46,7 @@ class Window(Protocol):
     layout_requested: SignalInstance
     theme_requested: SignalInstance
     unpin_requested: SignalInstance
+    drawer_requested: SignalInstance
     about_requested: SignalInstance
     preferences_requested: SignalInstance
 
@@ -124,6 +126,19 @@ def _layout(layout: Layout, number: int) -> Command:
     )
 
 
+def _drawer(tab: Tab, keys: str, tip: str) -> Command:
+    return Command(
+        f"drawer {tab}",
+        tab.capitalize(),
+        lambda window: window.drawer_requested.emit(tab),
+        keys=(keys,),
+        tip=tip,
+        needs=OPEN,
+        offered=lambda atlas: tab in tabs_of(atlas),
+        is_switch=True,
+    )
+
+
 def _look(direction: str, number: int) -> Command:
     return Command(
         f"from {direction}",
@@ -148,6 +163,7 @@ def _document(title: str, page: str, *keys: str) -> Command:
 
 
 LAYOUTS = tuple(_layout(layout, number) for number, layout in enumerate(Layout, start=1))
+DRAWER = (_drawer(Tab.POINT, "Ctrl+Shift+P", "What each covariate does to the places that are pinned"),)
 LOOKS = tuple(_look(direction, number) for number, direction in enumerate(DIRECTIONS, start=1))
 DOCUMENTS = (
     _document("User guide", "user-guide.md", "F1"),
@@ -241,6 +257,7 @@ COMMANDS = (
         needs=OPEN,
         is_switch=True,
     ),
+    *DRAWER,
     Command(
         "reset camera",
         "Reset camera",
@@ -271,7 +288,8 @@ MENUS = {
     "&File": ("open atlas", "open scan", RECENT, SEPARATOR, "export", "screenshot", SEPARATOR, "quit"),
     "&Edit": ("undo", "redo", "reset all", "unpin", SEPARATOR, "preferences"),
     "&View": (
-        *_names(LAYOUTS), "patients", SEPARATOR, "reset camera", *_names(LOOKS), SEPARATOR, *_names(THEMES),
+        *_names(LAYOUTS), "patients", *_names(DRAWER), SEPARATOR,
+        "reset camera", *_names(LOOKS), SEPARATOR, *_names(THEMES),
     ),
     "&Help": (*_names(DOCUMENTS), SEPARATOR, "about"),
 }  # fmt: skip

@@ -5,10 +5,12 @@ from __future__ import annotations
 from PySide6.QtCore import QSize
 from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 
+from naisr_viewer.state.drawer import Tab
 from naisr_viewer.views.changed_bar import ChangedBar
+from naisr_viewer.views.drawer import Drawer
 from naisr_viewer.views.empty_page import EmptyPage
 from naisr_viewer.views.error_bar import ErrorBar
-from naisr_viewer.views.ledger import LedgerDrawer
+from naisr_viewer.views.ledger import LedgerPage
 
 FULL_WIDTH_PX = 540
 """A narrower window takes from the panels as well as from the shapes."""
@@ -27,7 +29,8 @@ class Centre(QWidget):
         self.errors = ErrorBar(self)
         self.changed = ChangedBar(self)
         self.empty = EmptyPage(self)
-        self.ledger = LedgerDrawer(self)
+        self.ledger = LedgerPage(self)
+        self.drawer = Drawer({Tab.POINT: self.ledger}, self)
         self._shapes = shapes
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         column = QVBoxLayout(self)
@@ -37,7 +40,7 @@ class Centre(QWidget):
         column.addWidget(self.changed)
         column.addWidget(self.empty, 1)
         column.addWidget(shapes, 1)
-        column.addWidget(self.ledger)
+        column.addWidget(self.drawer)
         self.show_shapes(False)
 
     def sizeHint(self) -> QSize:
@@ -48,6 +51,11 @@ class Centre(QWidget):
     def stops(self) -> list[QWidget]:
         """What the Tab key goes through, as it is read."""
         return [*self.errors.stops, *self.changed.stops, self.empty.button]
+
+    @property
+    def drawer_stops(self) -> list[QWidget]:
+        """The same below the shapes."""
+        return [*self.drawer.stops, self.ledger]
 
     def show_shapes(self, is_open: bool) -> None:
         """Show the shapes where an atlas is open, else the empty page."""

@@ -1,12 +1,12 @@
-"""Beneath the shapes: what moved each pinned place from the template to where it is."""
+"""The drawer's page Point: what moved each pinned place from the template to where it is."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QScrollArea, QSizePolicy, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QScrollArea, QSizePolicy, QWidget
 
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.pins import Entry, Ledger, Part, Pin
@@ -17,7 +17,6 @@ from naisr_viewer.words import ledger as words
 from naisr_viewer.words.numbers import way
 from naisr_viewer.words.titles import as_tip
 
-HEIGHT_PX, FRAME_PX = 170, 6
 TITLE_PX, LINE_PX = 24, 20
 NAME_PX, FIGURE_PX, ALONG_PX = 96, 78, 118
 """Widths of the name, of the figure and, where there is room, of what is along the surface."""
@@ -132,60 +131,36 @@ class EntryChart(QWidget):
         painter.drawText(box, side | Qt.AlignmentFlag.AlignVCenter, seen)
 
 
-class LedgerDrawer(QFrame):
-    """The pinned places beside one another; hidden where there are none."""
-
-    close_requested = Signal()  # the cross was pressed
+class LedgerPage(QScrollArea):
+    """The pinned places beside one another, or how to pin one."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setObjectName("ledger")
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self._theme = LIGHT
         self._atlas: AtlasCard | None = None
         self._ledger: Ledger | None = None
         self.charts: dict[Pin, EntryChart] = {}
-        self._area = QScrollArea(self)
-        self._area.setWidgetResizable(True)
-        self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self._inside = QWidget(self)
-        self._row = QHBoxLayout(self._inside)
-        self._row.setContentsMargins(14, 4, 6, 8)
+        self.setWidgetResizable(True)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        inside = QWidget(self)
+        self._row = QHBoxLayout(inside)
+        self._row.setContentsMargins(14, 2, 14, 4)
         self._row.setSpacing(28)
         self._row.setAlignment(Qt.AlignmentFlag.AlignTop)
-        self._area.setWidget(self._inside)
-        self.cross = QToolButton(self)
-        self.cross.setText("×")
-        self.cross.setAutoRaise(True)
-        self.cross.setAccessibleName("Remove the pins")
-        self.cross.setToolTip("Remove the pins (Esc)")
-        self.cross.clicked.connect(self.close_requested)
-        outer = QHBoxLayout(self)
-        outer.setContentsMargins(0, 1, 0, 0)
-        outer.addWidget(self._area, 1)
-        corner = QVBoxLayout()
-        corner.addWidget(self.cross)
-        corner.addStretch(1)
-        outer.addLayout(corner)
-        self.hide()
-
-    def sizeHint(self) -> QSize:
-        """As high as its lines; beyond :data:`HEIGHT_PX` they are scrolled."""
-        return QSize(super().sizeHint().width(), min(self._inside.sizeHint().height() + FRAME_PX, HEIGHT_PX))
-
-    @property
-    def stops(self) -> list[QWidget]:
-        """What the Tab key goes through, as it is read."""
-        return [self._area, self.cross]
+        self._invitation = QLabel(words.INVITATION, self)
+        self._invitation.setObjectName("muted")
+        self._invitation.setWordWrap(True)
+        self._row.addWidget(self._invitation)
+        self.setWidget(inside)
 
     def show_ledger(self, ledger: Ledger | None, atlas: AtlasCard | None) -> None:
-        """Show what moved the pinned places; None hides all of it."""
+        """Show what moved the pinned places; None where there are none."""
         self._ledger, self._atlas = ledger, atlas
         pins = () if ledger is None else ledger.request.pins
         if tuple(self.charts) != pins:
             self._make_charts(pins)
+        self._invitation.setVisible(not pins)
         self._fill()
-        self.setVisible(bool(pins))
 
     def set_theme(self, theme: Theme) -> None:
         """Follow the theme."""
@@ -194,14 +169,12 @@ class LedgerDrawer(QFrame):
 
     def _make_charts(self, pins: tuple[Pin, ...]) -> None:
         for chart in self.charts.values():
+            self._row.removeWidget(chart)
             chart.hide()
             chart.deleteLater()
-        while self._row.count():
-            self._row.takeAt(0)
         self.charts = {pin: EntryChart(pin, self) for pin in pins}
         for chart in self.charts.values():
             self._row.addWidget(chart, 1)
-        self._row.addStretch(0)
 
     def _fill(self) -> None:
         if self._ledger is None or self._atlas is None:
@@ -213,4 +186,3 @@ class LedgerDrawer(QFrame):
         ways = [abs(part.normal_mm) for entry in entries.values() for _, part in words.lines(entry)]
         for pin, chart in self.charts.items():
             chart.show_entry(entries.get(pin), max([LEAST_SCALE_MM, *ways]), ink)
-        self.updateGeometry()

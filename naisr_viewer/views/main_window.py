@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QApplication, QHBoxLayout, QMainWindow, QWidget
 
 from naisr_model.shipped import shipped
 from naisr_viewer.panels.kinds import visible_panels
+from naisr_viewer.state.drawer import Tab, tabs_of
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.patients import Labels
 from naisr_viewer.state.pins import Ledger
@@ -74,7 +75,8 @@ class MainWindow(QMainWindow):
     undo_requested = Signal()  # Edit > Undo
     redo_requested = Signal()  # Edit > Redo
     layout_requested = Signal(object)  # a Layout from the View menu or the toolbar
-    unpin_requested = Signal()  # Edit > Remove pins, or the cross of the drawer
+    unpin_requested = Signal()  # Edit > Remove pins
+    drawer_requested = Signal(object)  # a Tab of the drawer, or None to close it
     theme_requested = Signal(object)  # a ThemeChoice from the View menu
     cancel_requested = Signal()  # the cancel button beside the progress bar
     about_requested = Signal()  # Help > About
@@ -118,11 +120,13 @@ class MainWindow(QMainWindow):
             self.shapes.show_atlas(state.atlas, theme)
             self.setWindowTitle(f"{state.atlas.name} — {TITLE}")
             offer(COMMANDS, self._actions, state.atlas)
+            self._centre.drawer.offer(tabs_of(state.atlas))
             in_order(self._stops)
         self._centre.show_shapes(state.atlas is not None)
         if state.is_atlas_changed != old.is_atlas_changed:  # what was put off stays so
             name = state.atlas.path.name if state.atlas and state.is_atlas_changed else ""
             self._centre.changed.show_changed(name)
+        self._centre.drawer.show_tab(state.drawer)
         self.scale.setVisible(state.atlas is not None)
         self.covariates.show_values(state)
         self.patients.show_state(state)
@@ -132,6 +136,8 @@ class MainWindow(QMainWindow):
         self.shapes.show_panels(visible_panels(state))
         self._show_ghost(state)
         self._actions[f"layout {state.layout}"].setChecked(True)
+        for tab in Tab:
+            self._actions[f"drawer {tab}"].setChecked(tab is state.drawer)
         self._enable()
 
     def show_sides(self) -> None:
@@ -150,8 +156,8 @@ class MainWindow(QMainWindow):
     @property
     def _stops(self) -> list[QWidget]:
         """What the Tab key goes through, as it is read: the panels from left to right, then what is below."""
-        centre = [*self._centre.stops, self.shapes.row_bar, *self._centre.ledger.stops]
-        return [*self.covariates.stops, *centre, *self.patients.stops, self.cancel]
+        shapes = [*self._centre.stops, self.shapes.row_bar, *self._centre.drawer_stops]
+        return [*self.covariates.stops, *shapes, *self.patients.stops, self.cancel]
 
     def show_history(self, can_undo: bool, can_redo: bool) -> None:
         """Enable what can be undone and redone."""
@@ -324,7 +330,7 @@ class MainWindow(QMainWindow):
         self._recent.file_chosen.connect(self.open_requested)
         self._centre.empty.open_requested.connect(self.ask_atlas)
         self._centre.changed.reopen_requested.connect(self._ask_again)
-        self._centre.ledger.close_requested.connect(self.unpin_requested)
+        self._centre.drawer.tab_requested.connect(self.drawer_requested)
         self.patients.open_requested.connect(self.ask_scan)
         self.cancel.clicked.connect(self.cancel_requested)
         self.shapes.scale_changed.connect(self.scale.set_scale)

@@ -77,7 +77,11 @@ def style_sheet(theme: Theme) -> str:
                 background: {t.raised}; border: 1px solid {t.muted}; border-radius: 2px;
                 width: 12px; height: 12px; }}
     #small {{ padding: 1px 8px; font-size: 9pt; }}
-    #ledger {{ background: {t.window}; border-top: 1px solid {t.line}; }}
+    #drawer {{ background: {t.window}; border-top: 1px solid {t.line}; }}
+    #drawer QToolButton {{ border: 1px solid transparent; border-radius: 4px; padding: 1px 10px;
+                color: {t.muted}; background: transparent; }}
+    #drawer QToolButton:hover, #drawer QToolButton:focus {{ border-color: {t.accent}; }}
+    #drawer QToolButton:checked {{ color: {t.text}; background: {t.line}; font-weight: 600; }}
     #section {{ font-size: 11pt; font-weight: 600; }}
     #figure {{ font-weight: 600; }}
     #changed {{ background: {t.raised}; border: 1px solid {t.accent}; border-radius: 6px; }}

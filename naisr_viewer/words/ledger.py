@@ -12,6 +12,10 @@ HINT = (
     "How far this place of the full shape has come from the template, cause by cause, along the outward "
     "normal: + outwards, − inwards. The causes add up."
 )
+INVITATION = (
+    "Click on a shape to pin a place, up to three. It is marked in every shape, and here stands what each "
+    "covariate does to it, in millimetres. Esc removes the pins."
+)
 NO_PLACE = "The deformation folds at this place: it has no one place in the full shape."
 
 

@@ -43,6 +43,7 @@ class WindowSignals(QObject):
     redo_requested = Signal()
     layout_requested = Signal(object)
     theme_requested = Signal(object)
+    drawer_requested = Signal(object)
     cancel_requested = Signal()
     about_requested = Signal()
     preferences_requested = Signal()
