@@ -76,6 +76,7 @@ class Controller(QObject):
         self._thrift = Thrift(self.refinement)
         self._window, self._engine, self._preferences = window, engine, preferences
         self._timeline = Timeline(engine)
+        self._beside: list[Worker] = []
         self._before_move: ExplorerState | None = None
         self._connect()
         window.show_recent(preferences.recent)
@@ -90,7 +91,11 @@ class Controller(QObject):
     @property
     def is_busy(self) -> bool:
         """Whether something is being computed that somebody waits for."""
-        return self.refinement.is_busy
+        return self.refinement.is_busy or any(worker.is_busy for worker in self._beside)
+
+    def wait_for(self, worker: Worker) -> None:
+        """Count what a worker does beside the surfaces as work that somebody waits for."""
+        self._beside.append(worker)
 
     @property
     def is_moving(self) -> bool:

@@ -44,6 +44,7 @@ class PinDesk(QObject):
         controller.changed.connect(self.follow)
         for worker in (finder, teller):
             worker.failed.connect(self._failed)
+            controller.wait_for(worker)
 
     def pin(self, panel: Panel, point_mm: Point) -> None:
         """Mark the material point at a point of the surface that is shown in ``panel``."""

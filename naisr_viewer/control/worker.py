@@ -48,7 +48,7 @@ class Worker(QObject):
         self._generation = 0
         self._oldest_valid = 0
         self._started = 0
-        self._running = False
+        self._running = self._owes = False
         self._waiting: tuple[int, Job[Any], Deliver[Any]] | None = None
         self._closed = False
         self._changed = Condition()
@@ -69,9 +69,15 @@ class Worker(QObject):
                 return
             self._generation += 1
             self._waiting = (self._generation, job, then)
+            self._owes = True
             self._changed.notify()
         if self._thread is None:
             self._run_waiting()
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether something that was submitted has not been answered, given up or refused yet."""
+        return self._owes
 
     def cancel(self) -> None:
         """Make everything submitted so far stale; :attr:`idle` follows, even if nothing had begun."""
@@ -135,6 +141,7 @@ class Worker(QObject):
             return
         if signal == "idle":
             if self._waiting is None and generation == self._started:
+                self._owes = False
                 self.idle.emit()
         elif self._is_stale(generation):
             return

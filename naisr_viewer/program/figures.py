@@ -13,12 +13,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import numpy as np
+
 from naisr_model.shipped import shipped_atlas
 from naisr_viewer.control.controller import Controller
 from naisr_viewer.program import start
 from naisr_viewer.program.display import ensure_display
 from naisr_viewer.program.headless import finish, take_screenshot
-from naisr_viewer.state.layouts import Layout
+from naisr_viewer.state.layouts import FULL_SHAPE, Layout
 from naisr_viewer.state.patients import Named, Reading
 from naisr_viewer.views.main_window import MainWindow
 
@@ -37,7 +39,9 @@ class Child:
 
 
 def main(folder: Path) -> None:
-    """Write ``window.png`` and ``patient.png`` into a folder."""
+    """Write ``window.png`` and ``patient.png`` into a folder, and those of the user guide under ``docs``."""
+    pictures = folder / "docs" / "pictures"
+    pictures.mkdir(parents=True, exist_ok=True)
     ensure_display(PIXELS)
     engine = start.make_engine("cpu")
     card = engine.open(shipped_atlas())
@@ -46,11 +50,30 @@ def main(folder: Path) -> None:
         window.show()
         controller.show_atlas(card, SHOWN)
         take_screenshot(window, controller, folder / "window.png")
+        for name, scene in SCENES.items():
+            scene(window, controller)
+            take_screenshot(window, controller, pictures / f"{name}.png")
+        controller.show_atlas(card, SHOWN)
         _fit(window, controller, _child(Path(scans)))
         controller.set_follow(True)
         controller.set_layout(Layout.CHANGE)
         controller.settle("age", dict(controller.state.named)["age"] + LATER_MONTHS)
         take_screenshot(window, controller, folder / "patient.png")
+
+
+def _pin_three_places(window: MainWindow, controller: Controller) -> None:
+    """At the upper and the lower end, and half way between."""
+    finish(window, controller)
+    surface = controller.shown[FULL_SHAPE]
+    for share in (0.75, 0.45, 0.1):
+        height_mm = np.quantile(surface.points_mm[:, 2], share)
+        nearest = np.argmin(np.abs(surface.points_mm[:, 2] - height_mm))
+        window.shapes.clicked.emit(FULL_SHAPE, tuple(surface.points_mm[nearest].tolist()))
+        finish(window, controller)
+
+
+SCENES = {"point": _pin_three_places}
+"""The pictures of the user guide, by name; each scene starts where the one before it ended."""
 
 
 def _child(folder: Path) -> Child:

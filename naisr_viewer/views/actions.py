@@ -34,6 +34,7 @@ class Fact(Enum):
     PAST = auto()  # an act can be undone
     FUTURE = auto()  # one that was undone can be redone
     PINS = auto()  # places are pinned
+    CALM = auto()  # no computation can be stopped, so that Esc is free
 
 
 class Window(Protocol):
@@ -237,7 +238,7 @@ COMMANDS = (
         lambda window: window.unpin_requested.emit(),
         keys=("Esc",),
         tip="Remove the pinned places; a click on a shape pins one",
-        needs=frozenset({Fact.PINS}),
+        needs=frozenset({Fact.PINS, Fact.CALM}),
         offered=lambda atlas: atlas.capabilities.trackable,
     ),
     Command(
@@ -349,7 +350,7 @@ def make_toolbar(actions: Mapping[str, QAction], parent: QWidget) -> QToolBar:
     return bar
 
 
-def facts(state: ExplorerState, is_at_rest: bool, can_undo: bool, can_redo: bool) -> set[Fact]:
+def facts(state: ExplorerState, is_at_rest: bool, is_calm: bool, can_undo: bool, can_redo: bool) -> set[Fact]:
     """What is so, of all that commands may need."""
     holds = {
         Fact.ATLAS: state.atlas is not None,
@@ -359,6 +360,7 @@ def facts(state: ExplorerState, is_at_rest: bool, can_undo: bool, can_redo: bool
         Fact.PAST: can_undo,
         Fact.FUTURE: can_redo,
         Fact.PINS: bool(state.pins),
+        Fact.CALM: is_calm,
     }
     return {fact for fact, is_so in holds.items() if is_so}
 

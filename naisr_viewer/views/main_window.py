@@ -199,6 +199,7 @@ class MainWindow(QMainWindow):
     def show_progress(self, fraction: float | None) -> None:
         """The bar and its cancel button at the bottom right; None hides them, at 0 it only says: busy."""
         self._below.show_progress(fraction)
+        self._enable()
 
     def show_error(self, message: str) -> None:
         """Say what went wrong above the shapes until it is dismissed; an empty message hides it."""
@@ -227,7 +228,8 @@ class MainWindow(QMainWindow):
 
     def _enable(self) -> None:
         """Enable the commands that make sense."""
-        so = facts(self._state, self._is_editable, self._can_undo, self._can_redo)
+        is_calm = self.cancel.isHidden()
+        so = facts(self._state, self._is_editable, is_calm, self._can_undo, self._can_redo)
         enable(COMMANDS, self._actions, so)
 
     def ask_atlas(self) -> None:

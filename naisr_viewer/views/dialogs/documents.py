@@ -9,6 +9,7 @@ from pathlib import Path
 from PySide6.QtCore import QSize, QUrl
 from PySide6.QtGui import (
     QDesktopServices,
+    QImage,
     QKeySequence,
     QShortcut,
     QTextBlock,
@@ -25,6 +26,7 @@ FRAME = QSize(8, 40)
 
 MARGIN_PX = 18
 PAGE_ENDING = ".md"
+PICTURE = "\N{OBJECT REPLACEMENT CHARACTER}"
 CONTENTS = f"index{PAGE_ENDING}"
 
 
@@ -85,6 +87,7 @@ class DocumentWindow(QDialog):
         document = self.browser.document()
         document.setDocumentMargin(MARGIN_PX)
         _break_lines(document)
+        _fit_pictures(document, self.browser.viewport().width() - 2 * MARGIN_PX)
         self.setWindowTitle(document.firstBlock().text() or "Documents")
 
     def _go_to(self, anchor: str) -> None:
@@ -116,6 +119,23 @@ def _break_lines(document: QTextDocument) -> None:
     for block in _blocks(document):
         if block.blockFormat().nonBreakableLines():
             QTextCursor(block).mergeBlockFormat(breakable)
+
+
+def _fit_pictures(document: QTextDocument, most_px: int) -> None:
+    """Have no picture wider than the page; Qt shows them as large as they are."""
+    for place in _pictures(document):
+        cursor = QTextCursor(document)
+        cursor.setPosition(place)
+        cursor.setPosition(place + 1, QTextCursor.MoveMode.KeepAnchor)
+        look = cursor.charFormat().toImageFormat()
+        file = document.baseUrl().resolved(QUrl(look.name())).toLocalFile()
+        look.setWidth(min(most_px, QImage(file).width()))
+        cursor.setCharFormat(look)
+
+
+def _pictures(document: QTextDocument) -> list[int]:
+    """Where pictures stand; each is one character."""
+    return [place for place, letter in enumerate(document.toRawText()) if letter == PICTURE]
 
 
 def _headings(document: QTextDocument) -> Iterator[QTextBlock]:

@@ -65,11 +65,12 @@ def test_commands_are_enabled_by_what_is_so(parent, facts, enabled, disabled):
 
 def test_facts_are_those_of_the_state(card):
     def of(state: ExplorerState) -> set[Fact]:
-        return va.facts(state, is_at_rest=False, can_undo=False, can_redo=False)
+        return va.facts(state, is_at_rest=False, is_calm=False, can_undo=False, can_redo=False)
 
     assert of(ExplorerState()) == set()
     assert of(opened(ExplorerState(), card)) == {Fact.ATLAS}
-    assert va.facts(ExplorerState(), is_at_rest=True, can_undo=True, can_redo=True) == {
+    assert va.facts(ExplorerState(), is_at_rest=True, is_calm=True, can_undo=True, can_redo=True) == {
+        Fact.CALM,
         Fact.REST,
         Fact.PAST,
         Fact.FUTURE,
