@@ -58,6 +58,7 @@ def view(
     settings: Annotated[list[str] | None, Parameter("--set", negative=())] = None,
     scan: Path | None = None,
     label: str | None = None,
+    session: Path | None = None,
     screenshot: Path | None = None,
     demo: Path | None = None,
     measure: Path | None = None,
@@ -76,6 +77,8 @@ def view(
         A patient's file to open at once: a mesh, a label volume or a cloud of points.
     label
         Which label of a volume, its number or its name; with --scan.
+    session
+        What was on screen when File > Save session… wrote this file.
     screenshot
         Write a picture of the window to this PNG file and end; needs no display.
     demo
@@ -85,20 +88,19 @@ def view(
         Time the start and a drag of a slider, write the figures to this JSON file and end;
         needs no display.
     size
-        Size of the window in pixels, WIDTHxHEIGHT; left out, that of the last time, and 1280x800 of
-        pictures and measurements.
+        Size of the window in pixels, WIDTHxHEIGHT; left out, that of the last time; of pictures that of
+        the session or 1280x800.
     device
         Where exact surfaces are computed: cpu, cuda or mps.
     """
+    if session is not None:
+        return _go_on(session, size, screenshot, demo, device, [atlas, settings, scan, label, measure])
     path = (atlas or shipped_atlas()).absolute()
     pixels = USUAL_PIXELS if size is None else parse_size(size)
     require_file(path, "an atlas (.safetensors)")
     if label is not None and scan is None:
         raise InputError(f"--label {label} is of a scan; give --scan FILE too")
-    for file in filter(None, (screenshot, measure)):
-        checked_place(file)
-    if demo is not None and demo.exists() and not demo.is_dir():
-        raise InputError(f"--demo writes into a folder, and {demo} is none; give another name")
+    _require_places(screenshot, demo, measure)
     engine = start.make_engine(device)
     if measure is not None:
         if settings or scan or label is not None or screenshot or demo:
@@ -109,6 +111,38 @@ def view(
     if screenshot or demo:
         return start.unattended(engine, first, pixels, screenshot, demo)
     return start.attended(engine, first, None if size is None else pixels)
+
+
+def _go_on(
+    session: Path,
+    size: str | None,
+    screenshot: Path | None,
+    demo: Path | None,
+    device: str,
+    others: Sequence[object],
+) -> int:
+    """The window as a session has it."""
+    if any(others):
+        raise InputError(
+            "--session says what is shown; leave out atlas, --set, --scan, --label and --measure"
+        )
+    from naisr_viewer.files.sessions import read_session
+
+    saved = read_session(session)
+    _require_places(screenshot, demo)
+    pixels = None if size is None else parse_size(size)
+    first = start.First(saved.atlas.path, session=session.absolute())
+    engine = start.make_engine(device)
+    if screenshot or demo:
+        return start.unattended(engine, first, pixels or saved.window_px, screenshot, demo)
+    return start.attended(engine, first, pixels)
+
+
+def _require_places(picture: Path | None, demo: Path | None, figures: Path | None = None) -> None:
+    for file in filter(None, (picture, figures)):
+        checked_place(file)
+    if demo is not None and demo.exists() and not demo.is_dir():
+        raise InputError(f"--demo writes into a folder, and {demo} is none; give another name")
 
 
 def parse_settings(card: AtlasCard, settings: Sequence[str]) -> dict[str, float]:

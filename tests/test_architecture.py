@@ -66,7 +66,8 @@ class Rule:
 COVARIATES = "naisr_model.covariates"
 VOCABULARY = (COVARIATES, "naisr_model.capabilities")
 LIGHT = tuple(
-    f"naisr_model.{name}" for name in ("errors", "exports", "files", "progress", "shipped", "terminal")
+    f"naisr_model.{name}"
+    for name in ("errors", "exports", "files", "progress", "records", "shipped", "terminal")
 )
 """What anybody may use."""
 

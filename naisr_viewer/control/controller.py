@@ -115,12 +115,17 @@ class Controller(QObject):
 
     def show_atlas(self, card: AtlasCard, values: Mapping[str, float] = MappingProxyType({})) -> None:
         """Show an atlas that is open in the engine; covariates left out are at their mean."""
-        self._finish_move()
-        self._preferences.remember(card.path)
-        self._window.show_recent(self._preferences.recent)
         state = opened(self.state, card)
         for name, value in values.items():
             state = with_value(state, name, value)
+        self.begin(state)
+
+    def begin(self, state: ExplorerState) -> None:
+        """Show an atlas that is open in the engine, as it is in ``state``; nothing lies behind to undo."""
+        assert state.atlas is not None
+        self._finish_move()
+        self._preferences.remember(state.atlas.path)
+        self._window.show_recent(self._preferences.recent)
         self._timeline.begin()
         self.go(state)
         self._timeline.release(self.state)

@@ -77,7 +77,7 @@ class PatientDesk(QObject):
         if self._controller.state.atlas is None:
             self._window.show_error("Open an atlas first; a scan is fitted to it.")
             return
-        self._read(Order(next(self._keys), reading, self._known_of(reading)))
+        self._read(Order(self._new_key(), reading, self._known_of(reading)))
 
     def show(self, key: int | None) -> None:
         """Show another patient, or the population average."""
@@ -104,7 +104,7 @@ class PatientDesk(QObject):
         """Read the patient's file anew, as another patient, so that both can be compared."""
         patient = self._controller.state.shown
         if patient is not None:
-            self._read(Order(next(self._keys), patient.reading, self._window.patients.known.given()))
+            self._read(Order(self._new_key(), patient.reading, self._window.patients.known.given()))
 
     def fit(self, known: Named) -> None:
         """Fit the atlas to the patient that is shown; covariates that are not known are inferred."""
@@ -165,7 +165,9 @@ class PatientDesk(QObject):
         """A scan that was read differently has to be fitted again; undo brings back how it was."""
         old = self._controller.state.find(order.key)
         name = old.name if old is not None else self._name(order.reading)
-        patient = OpenScan(order.key, name, order.reading, scan, order.known, written=stamp)
+        patient = OpenScan(
+            order.key, name, order.reading, scan, order.known, written=stamp, aligned_at=order.known
+        )
         self._controller.commit(with_patient(self._controller.state, patient))
         self._watch()
         self._look_at_files()
@@ -180,6 +182,11 @@ class PatientDesk(QObject):
         state = with_patient(self._controller.state, placed)
         layout = Layout.FIT if patient.fit is None else state.layout
         self._controller.commit(replace(state, layout=layout))
+
+    def _new_key(self) -> int:
+        """One that nobody has who is open; those of a session are not counted here."""
+        taken = {each.key for each in self._controller.state.patients}
+        return next(key for key in self._keys if key not in taken)
 
     def _known_of(self, reading: Reading) -> Named:
         """What is known of an open patient with the same file."""

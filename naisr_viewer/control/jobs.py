@@ -11,12 +11,15 @@ from naisr_viewer.control.worker import Deliver, Job
 from naisr_viewer.engine.clinic import Clinic
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.engine.ledgers import ledger, origin_mm
+from naisr_viewer.engine.sessions import Restored, completed, restored
 from naisr_viewer.files.exports import Planned
+from naisr_viewer.files.sessions import read_session, write_session
 from naisr_viewer.files.surfaces import require_writable, write_surface
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.patients import Fitted, Labels, Named, Reading, Scan
 from naisr_viewer.state.pins import Ledger, LedgerRequest, Point
 from naisr_viewer.state.requests import ExportChoice, SurfaceRequest, SurfaceResult
+from naisr_viewer.state.session import Session
 
 Surfaces = tuple[SurfaceResult, ...]
 
@@ -88,6 +91,21 @@ def reading(clinic: Clinic, atlas: Path, wanted: Reading, known: Named) -> Job[S
 def fitting(clinic: Clinic, atlas: Path, scan: Scan, known: Named) -> Job[tuple[Fitted, Scan]]:
     """Fits an open atlas to a scan; hands over what was found, and the scan as it lay for it."""
     return lambda deliver, progress: deliver(clinic.fit(atlas, scan, known, progress))
+
+
+def saving(engine: Engine, session: Session, persons: Sequence[int], path: Path) -> Job[Path]:
+    """Writes a session, of whose patients these are the persons; hands over where it is."""
+
+    def job(deliver: Deliver[Path], _progress: Progress) -> None:
+        write_session(completed(engine, session, persons), path)
+        deliver(path)
+
+    return job
+
+
+def restoring(engine: Engine, clinic: Clinic, path: Path) -> Job[Restored]:
+    """Opens what a session had open; hands it over."""
+    return lambda deliver, progress: deliver(restored(engine, clinic, read_session(path), progress))
 
 
 def pinning(engine: Engine, surface: SurfaceRequest, point_mm: Point) -> Job[Point]:

@@ -18,6 +18,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
+import platformdirs
+
 from naisr_viewer.engine.atlases import load_atlas, require_device
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.program.display import ensure_display, require_display
@@ -44,6 +46,7 @@ class First:
         values: real covariate values by name, then; the others are at their mean.
         scan: a patient's file to open.
         label: which label of it, where it is a volume.
+        session: a session to open in place of all that.
     """
 
     path: Path
@@ -51,6 +54,7 @@ class First:
     values: Mapping[str, float] = field(default_factory=dict)
     scan: Path | None = None
     label: str | None = None
+    session: Path | None = None
 
     @property
     def reading(self) -> Reading | None:
@@ -93,7 +97,7 @@ def remember_few_kernels() -> None:
 
 
 def make_window(
-    engine: Engine, settings_file: Path | None = None, is_attended: bool = False
+    engine: Engine, settings_file: Path | None = None, is_attended: bool = False, kept: Path | None = None
 ) -> tuple[MainWindow, Controller]:
     """A window and what drives it; the application object exists already.
 
@@ -101,6 +105,7 @@ def make_window(
         engine: computes the surfaces.
         settings_file: an INI file for recent files and theme instead of the user's own settings.
         is_attended: whether somebody sits there who can be asked.
+        kept: where what is on screen is kept for the next run; None where nobody comes back.
     """
     from PySide6.QtCore import QSettings
 
@@ -109,6 +114,7 @@ def make_window(
     from naisr_viewer.control.desk import PatientDesk
     from naisr_viewer.control.pinning import PinDesk
     from naisr_viewer.control.preferences import Preferences
+    from naisr_viewer.control.sessions import SessionDesk
     from naisr_viewer.control.worker import Worker
     from naisr_viewer.engine.clinic import Clinic
     from naisr_viewer.views.main_window import MainWindow
@@ -119,10 +125,17 @@ def make_window(
         settings = QSettings(str(settings_file), QSettings.Format.IniFormat)
     window = MainWindow()
     controller = Controller(window, engine, Worker(), Worker(), Preferences(settings), is_attended)
-    PatientDesk(window, controller, Clinic(engine))  # the controller owns it
+    clinic = Clinic(engine)
+    PatientDesk(window, controller, clinic)  # the controller owns it
     AtlasWatch(controller)  # and this
     PinDesk(window, controller, engine, Worker(), Worker())  # and this
+    SessionDesk(window, controller, engine, clinic, Worker(), Worker(), kept)  # and this
     return window, controller
+
+
+def kept_session() -> Path:
+    """Where what is on screen is kept from one run to the next."""
+    return platformdirs.user_state_path("naisr-viewer", appauthor=False) / "session.json"
 
 
 def make_application() -> QApplication:
@@ -158,7 +171,7 @@ def attended(engine: Engine, first: First, pixels: tuple[int, int] | None) -> in
 
     from naisr_viewer.program.interrupts import ending_at_once
 
-    window, controller = make_window(engine, is_attended=True)
+    window, controller = make_window(engine, is_attended=True, kept=kept_session())
     if (reading := first.reading) is not None:
         once = Qt.ConnectionType.SingleShotConnection
         controller.refinement.settled.connect(lambda: window.reading_requested.emit(reading), once)
@@ -173,13 +186,15 @@ def show(window: MainWindow, controller: Controller, first: First) -> None:
 
     def begin() -> None:
         window.shapes.prepare()
-        if first.card is None:
+        if first.session is not None:
+            window.session_requested.emit(first.session)
+        elif first.card is None:
             controller.open(first.path)
         else:
             controller.show_atlas(first.card, first.values)
 
     sys.excepthook = controller.report
-    window.show_opening(first.path.name)
+    window.show_opening((first.session or first.path).name)
     window.appeared.connect(begin)
     window.show()
 
@@ -211,18 +226,24 @@ def measured(engine: Engine, path: Path, pixels: tuple[int, int], file: Path, lo
 def unattended(
     engine: Engine, first: First, pixels: tuple[int, int], screenshot: Path | None, demo: Path | None
 ) -> int:
-    """The same window without a person."""
+    """The same window without a person.
+
+    Raises:
+        InputError: when something is not as it was asked for, or as it was saved.
+    """
     from naisr_viewer.engine.clinic import Clinic
     from naisr_viewer.program import headless
 
-    assert first.card is not None
     if first.reading is not None:
         Clinic.require_label(first.reading)
     ensure_display(pixels)
     with own_window(engine) as (window, controller):
         window.resize(*pixels)
         window.show()
-        controller.show_atlas(first.card, first.values)
+        if first.session is not None:
+            window.session_requested.emit(first.session)
+        elif first.card is not None:
+            controller.show_atlas(first.card, first.values)
         if first.reading is not None:
             headless.finish(window, controller)
             window.reading_requested.emit(first.reading)

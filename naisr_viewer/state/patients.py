@@ -122,6 +122,7 @@ class OpenScan:
         fit: None before the first fit.
         written: of the file, when it was read.
         is_changed: whether the file has changed on the disk since.
+        aligned_at: covariates of the shape that the scan was aligned to.
     """
 
     key: int
@@ -132,3 +133,4 @@ class OpenScan:
     fit: Fitted | None = None
     written: Stamp = None
     is_changed: bool = False
+    aligned_at: Named = ()

@@ -33,6 +33,7 @@ class Fact(Enum):
     FORECAST = auto()  # and so well that it can be shown at other covariates
     PAST = auto()  # an act can be undone
     FUTURE = auto()  # one that was undone can be redone
+    LEFT = auto()  # a session of an earlier run was kept
     PINS = auto()  # places are pinned
     CALM = auto()  # no computation can be stopped, so that Esc is free
 
@@ -42,6 +43,7 @@ class Window(Protocol):
 
     covariates: CovariatePanel
     shapes: ShapeView
+    going_on_requested: SignalInstance
     undo_requested: SignalInstance
     redo_requested: SignalInstance
     layout_requested: SignalInstance
@@ -56,6 +58,12 @@ class Window(Protocol):
 
     def ask_scan(self) -> None:
         """Let a patient's file be chosen and opened."""
+
+    def ask_session(self) -> None:
+        """Let a session be chosen and opened."""
+
+    def ask_session_place(self) -> None:
+        """Let a place be chosen for the session."""
 
     def ask_export(self) -> None:
         """Let surfaces be chosen and written."""
@@ -192,6 +200,28 @@ COMMANDS = (
         needs=AT_REST,
     ),
     Command(
+        "open session",
+        "Open session…",
+        lambda window: window.ask_session(),
+        keys=("Ctrl+Alt+O",),
+        tip="Bring back what a session had on screen",
+    ),
+    Command(
+        "save session",
+        "Save session…",
+        lambda window: window.ask_session_place(),
+        keys=("Ctrl+Shift+S",),
+        tip="Keep all that is on screen, to bring it back",
+        needs=AT_REST,
+    ),
+    Command(
+        "go on",
+        "Go on where you left",
+        lambda window: window.going_on_requested.emit(),
+        tip="Bring back what was on screen when the window was closed last",
+        needs=frozenset({Fact.REST, Fact.LEFT}),
+    ),
+    Command(
         "export",
         "Export…",
         lambda window: window.ask_export(),
@@ -286,7 +316,10 @@ def _names(commands: Sequence[Command]) -> tuple[str, ...]:
 
 
 MENUS = {
-    "&File": ("open atlas", "open scan", RECENT, SEPARATOR, "export", "screenshot", SEPARATOR, "quit"),
+    "&File": (
+        "open atlas", "open scan", "open session", RECENT, "go on", SEPARATOR,
+        "save session", "export", "screenshot", SEPARATOR, "quit",
+    ),
     "&Edit": ("undo", "redo", "reset all", "unpin", SEPARATOR, "preferences"),
     "&View": (
         *_names(LAYOUTS), "patients", *_names(DRAWER), SEPARATOR,
@@ -350,7 +383,9 @@ def make_toolbar(actions: Mapping[str, QAction], parent: QWidget) -> QToolBar:
     return bar
 
 
-def facts(state: ExplorerState, is_at_rest: bool, is_calm: bool, can_undo: bool, can_redo: bool) -> set[Fact]:
+def facts(
+    state: ExplorerState, is_at_rest: bool, is_calm: bool, can_undo: bool, can_redo: bool, can_go_on: bool
+) -> set[Fact]:
     """What is so, of all that commands may need."""
     holds = {
         Fact.ATLAS: state.atlas is not None,
@@ -361,6 +396,7 @@ def facts(state: ExplorerState, is_at_rest: bool, is_calm: bool, can_undo: bool,
         Fact.FUTURE: can_redo,
         Fact.PINS: bool(state.pins),
         Fact.CALM: is_calm,
+        Fact.LEFT: can_go_on,
     }
     return {fact for fact, is_so in holds.items() if is_so}
 

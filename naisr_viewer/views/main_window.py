@@ -38,9 +38,12 @@ from naisr_viewer.views.dialogs.files import (
     ask_image_path,
     ask_open_path,
     ask_scan_path,
+    ask_session_path,
+    ask_session_place,
     dropped,
     is_atlas,
     is_scan,
+    is_session,
 )
 from naisr_viewer.views.dialogs.instead import ask_instead
 from naisr_viewer.views.dialogs.label import ask_label
@@ -71,6 +74,9 @@ class MainWindow(QMainWindow):
         object
     )  # a Reading: a patient's file and how to read it, from the command line
     export_requested = Signal(object)  # an ExportChoice from the dialog
+    session_requested = Signal(Path)  # a session was chosen or dropped
+    session_place_chosen = Signal(Path)  # where the session shall go
+    going_on_requested = Signal()  # File > Go on where you left
     screenshot_requested = Signal(Path)  # where the picture shall go
     undo_requested = Signal()  # Edit > Undo
     redo_requested = Signal()  # Edit > Redo
@@ -94,7 +100,7 @@ class MainWindow(QMainWindow):
         self._has_appeared = False
         self._documents: DocumentWindow | None = None
         self._focus = FocusRest(self)
-        self._is_editable, self._can_undo, self._can_redo = True, False, False
+        self._is_editable, self._can_undo, self._can_redo, self._can_go_on = True, False, False, False
         self.covariates = CovariatePanel(self)
         self.shapes = ShapeView(self)
         self.patients = PatientPanel(self)
@@ -164,6 +170,11 @@ class MainWindow(QMainWindow):
         self._can_undo, self._can_redo = can_undo, can_redo
         self._enable()
 
+    def show_left(self, can_go_on: bool) -> None:
+        """Whether there is a session of an earlier run to go on with."""
+        self._can_go_on = can_go_on
+        self._enable()
+
     def show_ledger(self, ledger: Ledger | None) -> None:
         """Mark the pinned places on the shapes and tell what moved them; None takes all of it away."""
         self._centre.ledger.show_ledger(ledger, self._state.atlas)
@@ -229,7 +240,8 @@ class MainWindow(QMainWindow):
     def _enable(self) -> None:
         """Enable the commands that make sense."""
         is_calm = self.cancel.isHidden()
-        so = facts(self._state, self._is_editable, is_calm, self._can_undo, self._can_redo)
+        past = self._can_undo, self._can_redo, self._can_go_on
+        so = facts(self._state, self._is_editable, is_calm, *past)
         enable(COMMANDS, self._actions, so)
 
     def ask_atlas(self) -> None:
@@ -261,6 +273,18 @@ class MainWindow(QMainWindow):
         choice = ExportDialog(self._state, self).ask()
         if choice is not None:
             self.export_requested.emit(choice)
+
+    def ask_session(self) -> None:
+        """Let a session be chosen and opened."""
+        path = ask_session_path(self)
+        if path is not None:
+            self.session_requested.emit(path)
+
+    def ask_session_place(self) -> None:
+        """Let a place be chosen for the session."""
+        path = ask_session_place(self, self._state)
+        if path is not None:
+            self.session_place_chosen.emit(path)
 
     def ask_screenshot(self) -> None:
         """Let a place be chosen for a picture."""
@@ -306,11 +330,12 @@ class MainWindow(QMainWindow):
             event.acceptProposedAction()
 
     def dropEvent(self, event: QDropEvent) -> None:
-        """Open what was dropped: an atlas by its ending, all others as scans."""
+        """Open what was dropped: atlases and sessions by their endings, all others as scans."""
         if files := dropped(event.mimeData()):
             event.acceptProposedAction()
         for file in files:
-            (self.open_requested if is_atlas(file) else self.scan_requested).emit(file)
+            chosen = (is_atlas, self.open_requested), (is_session, self.session_requested)
+            next((signal for is_one, signal in chosen if is_one(file)), self.scan_requested).emit(file)
 
     def _compose(self) -> None:
         body = QWidget(self)

@@ -154,8 +154,9 @@ class EllipsoidAtlas:
 
 @pytest.fixture(autouse=True)
 def no_traces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Keep tabulated displacements out of the cache of whoever runs the tests."""
+    """Keep tabulated displacements and sessions out of the folders of whoever runs the tests."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "user-cache"))
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "user-state"))
 
 
 @pytest.fixture(autouse=True)

@@ -12,6 +12,8 @@ from naisr_viewer.state.explorer import ExplorerState
 ATLAS_ENDING = ".safetensors"
 ATLAS_FILTER = f"Atlas (*{ATLAS_ENDING});;All files (*)"
 PICTURE_ENDING = ".png"
+SESSION_ENDING = ".json"
+SESSION_FILTER = f"Session (*{SESSION_ENDING})"
 SCAN_ENDINGS = (
     *("stl", "ply", "obj", "vtk", "vtp", "glb"),
     *("nii", "nii.gz", "hdr", "hdr.gz", "img", "img.gz", "nrrd", "nhdr", "mha", "mhd"),
@@ -32,6 +34,24 @@ def ask_scan_path(parent: QWidget) -> Path | None:
     filters = f"Meshes, label volumes and points ({endings});;All files (*)"
     name, _ = QFileDialog.getOpenFileName(parent, "Open a scan", "", filters)
     return Path(name) if name else None
+
+
+def ask_session_path(parent: QWidget) -> Path | None:
+    """The session to open, or None."""
+    name, _ = QFileDialog.getOpenFileName(parent, "Open a session", "", SESSION_FILTER)
+    return Path(name) if name else None
+
+
+def ask_session_place(parent: QWidget, state: ExplorerState) -> Path | None:
+    """Where a session goes, or None; whether a file may be replaced is asked of the whole name."""
+    whom = f"-{Path(state.shown.name).stem}" if state.shown else ""
+    proposal = f"{state.atlas.name if state.atlas else 'atlas'}{whom}-session{SESSION_ENDING}"
+    unasked = QFileDialog.Option.DontConfirmOverwrite
+    name, _ = QFileDialog.getSaveFileName(parent, "Save the session", proposal, SESSION_FILTER, "", unasked)
+    path = Path(name)
+    if not name or is_session(path):
+        return path if name else None
+    return path.with_name(f"{path.name}{SESSION_ENDING}")
 
 
 def ask_landmarks_path(parent: QWidget) -> Path | None:
@@ -67,3 +87,8 @@ def is_scan(file: Path) -> bool:
 def is_atlas(file: Path) -> bool:
     """Whether a file has the ending of an atlas."""
     return file.suffix.lower() == ATLAS_ENDING
+
+
+def is_session(file: Path) -> bool:
+    """Whether a file has the ending of a session."""
+    return file.suffix.lower() == SESSION_ENDING

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
 
 from naisr_viewer.panels.kinds import all_panels
 from naisr_viewer.state.atlas_card import AtlasCard
+from naisr_viewer.state.camera import Camera
 from naisr_viewer.state.layouts import FULL_SHAPE, Panel
 from naisr_viewer.state.requests import SurfaceResult
 from naisr_viewer.views.colours import ghost_colour, panel_colour
@@ -64,6 +65,7 @@ class ShapeView(QWidget):
         self._direction = OBLIQUE
         self._framed = self._looked_after = False
         self._moving = False
+        self._wanted: Camera | None = None
         self._seen_mm = (1.0, 1.5)
         self._fit_scale = 1.0
         self._height = 1
@@ -92,7 +94,7 @@ class ShapeView(QWidget):
     def show_atlas(self, atlas: AtlasCard, theme: Theme) -> None:
         """Make one sub-plot per panel of ``atlas`` and of its patients, still without surfaces."""
         self.prepare()
-        self._atlas, self._visible = atlas, ()
+        self._atlas, self._visible, self._wanted = atlas, (), None
         self._grid.fill(all_panels(atlas), atlas)
         self._ghost, self._marks = (None, NO_FACES), {}
         self._direction = OBLIQUE
@@ -179,6 +181,20 @@ class ShapeView(QWidget):
         """Stand at one of :data:`DIRECTIONS` and frame what is on screen."""
         self._look(DIRECTIONS[direction])
 
+    @property
+    def camera(self) -> Camera | None:
+        """Where the camera stands; None before the first picture."""
+        if self._canvas is None or not self._framed:
+            return self._wanted
+        eye = self._canvas.camera
+        zoom = eye.parallel_scale / self._fit_scale
+        return Camera(eye.position, eye.focal_point, eye.up, self._seen_mm, zoom)
+
+    def set_camera(self, camera: Camera) -> None:
+        """Let the camera stand there, now or as soon as there is something to see."""
+        self._wanted = camera
+        self._look_after()
+
     def clear(self) -> None:
         """Release the render window and all labels; nothing is drawn afterwards."""
         self._grid.clear()
@@ -245,14 +261,28 @@ class ShapeView(QWidget):
             self._arrange()
             canvas.camera.parallel_scale = self._fit_scale
 
+    def _stand(self, canvas: Canvas, camera: Camera) -> None:
+        eye = canvas.camera
+        eye.position, eye.focal_point, eye.up = camera.position_mm, camera.focus_mm, camera.up
+        self._seen_mm = camera.framed_mm
+        self._arrange()
+        eye.parallel_scale = camera.zoom * self._fit_scale
+        canvas.refresh()
+
     def _look_after(self) -> None:
         """Frame the first surfaces, and those of a layout in which nothing of one would be seen.
 
         Otherwise the camera is the user's.
         """
-        if self._canvas is None or self._looked_after or self._canvas.box_mm() is None:
+        if self._canvas is None or self._canvas.box_mm() is None:
+            return
+        if self._looked_after and self._wanted is None:
             return
         is_complete = all(self._grid.cells[panel].has_surface for panel in self._visible)
+        if self._wanted is not None:
+            self._stand(self._canvas, self._wanted)
+            self._wanted, self._framed, self._looked_after = None, True, is_complete
+            return
         if not self._framed or (is_complete and self._canvas.is_any_missed()):
             self._frame(self._canvas)
         self._framed, self._looked_after = self._framed or is_complete, is_complete

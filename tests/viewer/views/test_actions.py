@@ -65,12 +65,17 @@ def test_commands_are_enabled_by_what_is_so(parent, facts, enabled, disabled):
 
 def test_facts_are_those_of_the_state(card):
     def of(state: ExplorerState) -> set[Fact]:
-        return va.facts(state, is_at_rest=False, is_calm=False, can_undo=False, can_redo=False)
+        return va.facts(
+            state, is_at_rest=False, is_calm=False, can_undo=False, can_redo=False, can_go_on=False
+        )
 
     assert of(ExplorerState()) == set()
     assert of(opened(ExplorerState(), card)) == {Fact.ATLAS}
-    assert va.facts(ExplorerState(), is_at_rest=True, is_calm=True, can_undo=True, can_redo=True) == {
+    assert va.facts(
+        ExplorerState(), is_at_rest=True, is_calm=True, can_undo=True, can_redo=True, can_go_on=True
+    ) == {
         Fact.CALM,
+        Fact.LEFT,
         Fact.REST,
         Fact.PAST,
         Fact.FUTURE,
@@ -116,8 +121,8 @@ def test_a_new_command_is_one_value_and_its_name_in_a_menu(parent):
 
 def test_every_command_finds_what_it_needs_in_the_real_window(qtbot, monkeypatch):
     """Dialogs are answered by nobody; what is emitted reaches nobody."""
-    for ask in ("ask_open_path", "ask_scan_path", "ask_image_path"):
-        monkeypatch.setattr(f"naisr_viewer.views.main_window.{ask}", lambda *_: None)
+    for ask in ("open_path", "scan_path", "image_path", "session_path", "session_place"):
+        monkeypatch.setattr(f"naisr_viewer.views.main_window.ask_{ask}", lambda *_: None)
     window = MainWindow()
     qtbot.addWidget(window)
     for command in COMMANDS:

@@ -1,0 +1,109 @@
+"""What is kept of a window so that it can be brought back, as frozen values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from naisr_viewer.state.atlas_card import AtlasCard
+from naisr_viewer.state.camera import Camera
+from naisr_viewer.state.explorer import ExplorerState, with_possible_layout
+from naisr_viewer.state.patients import Named, OpenScan, Reading
+
+
+@dataclass(frozen=True)
+class SavedFit:
+    """What was found of a patient; it is found again, and compared with this.
+
+    Attributes:
+        values: real values of all covariates.
+        code: the latent code.
+    """
+
+    values: Named
+    code: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class SavedPatient:
+    """A patient, by the file that is read again.
+
+    Attributes:
+        key: tells the open scans apart.
+        name: what the list shows.
+        reading: how the file is read.
+        known: covariates that were given.
+        aligned_at: covariates of the shape that it was aligned to.
+        fit: what was found; None before the first fit.
+    """
+
+    key: int
+    name: str
+    reading: Reading
+    known: Named = ()
+    aligned_at: Named = ()
+    fit: SavedFit | None = None
+
+
+@dataclass(frozen=True)
+class SavedAtlas:
+    """An atlas by its file.
+
+    Attributes:
+        path: where it was.
+        sha256: of its content, hexadecimal.
+    """
+
+    path: Path
+    sha256: str = ""
+
+
+@dataclass(frozen=True)
+class Session:
+    """All that was to be seen.
+
+    Attributes:
+        atlas: which was open.
+        state: the rest of the situation; of its patients, and of its atlas, there is nothing in it.
+        patients: those that were open.
+        camera: None before the first picture.
+        window_px: width and height of the window.
+    """
+
+    atlas: SavedAtlas
+    state: ExplorerState
+    patients: tuple[SavedPatient, ...] = ()
+    camera: Camera | None = None
+    window_px: tuple[int, int] = (1280, 800)
+
+
+def session_of(state: ExplorerState, camera: Camera | None, window_px: tuple[int, int]) -> Session:
+    """What is kept of ``state``; there is an atlas. Codes and hashes are for who knows the files to add."""
+    assert state.atlas is not None
+    return Session(
+        SavedAtlas(state.atlas.path),
+        replace(state, atlas=None, patients=(), is_atlas_changed=False),
+        tuple(_saved(each) for each in state.patients),
+        camera,
+        window_px,
+    )
+
+
+def state_of(session: Session, card: AtlasCard, patients: tuple[OpenScan, ...]) -> ExplorerState:
+    """The situation of a session with its atlas and its patients; of who could not be read it is silent."""
+    keys = {each.key for each in patients}
+    state = session.state
+    return with_possible_layout(
+        replace(
+            state,
+            atlas=card,
+            patients=patients,
+            patient=state.patient if state.patient in keys else None,
+            compared=state.compared if state.compared in keys else None,
+        )
+    )
+
+
+def _saved(patient: OpenScan) -> SavedPatient:
+    fit = None if patient.fit is None else SavedFit(patient.fit.values)
+    return SavedPatient(patient.key, patient.name, patient.reading, patient.known, patient.aligned_at, fit)
