@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import QCoreApplication, QEventLoop, Qt
+from PySide6.QtCore import QCoreApplication, QEvent, QEventLoop, Qt
 from PySide6.QtTest import QTest
 
 from naisr_model.errors import InputError
@@ -37,6 +37,7 @@ def wait_until(condition: Callable[[], bool], seconds: float = DEADLINE_S) -> No
         if time.monotonic() > end:
             raise InputError(f"gave up after {seconds:g} s; the machine is too slow or the atlas too large")
         QCoreApplication.processEvents(QEventLoop.ProcessEventsFlag.AllEvents, 20)
+        QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete.value)  # which that leaves out
         time.sleep(0.002)
 
 

@@ -43,7 +43,7 @@ def test_a_replaced_atlas_is_told_of_and_opened_again(ready, qtbot, atlas_file):
     window, controller = ready
     assert told(window) == []
     replace_file(atlas_file)
-    qtbot.waitUntil(lambda: bool(told(window)), timeout=10_000)
+    qtbot.waitUntil(lambda: bool(told(window)), timeout=30_000)
     assert atlas_file.name in told(window)[0] and controller.state.values == (100.0, 35.0, 0.0)
     before = controller.state.atlas
     press(window, "Open again")
@@ -55,7 +55,7 @@ def test_a_replaced_atlas_is_told_of_and_opened_again(ready, qtbot, atlas_file):
 def test_what_was_put_off_stays_away(ready, qtbot, atlas_file):
     window, controller = ready
     replace_file(atlas_file)
-    qtbot.waitUntil(lambda: bool(told(window)), timeout=10_000)
+    qtbot.waitUntil(lambda: bool(told(window)), timeout=30_000)
     press(window, "Not now")
     controller.settle("age", 150.0)
     qtbot.waitUntil(lambda: not controller.is_busy, timeout=30_000)

@@ -213,7 +213,7 @@ def test_a_simulated_surgery(fitted, qtbot, scan_file):
     other = scan_file.with_suffix(".new.stl")
     longer.export(other)
     os.replace(other, scan_file)
-    qtbot.waitUntil(lambda: controller.state.shown.is_changed, timeout=10_000)
+    qtbot.waitUntil(lambda: controller.state.shown.is_changed, timeout=30_000)
     window.patients.reread_requested.emit()
     settle(qtbot, controller)
     old, new = controller.state.patients
@@ -640,7 +640,7 @@ def test_a_file_that_is_deleted_and_written_anew_has_changed(ready, qtbot, scan_
     qtbot.wait(200)
     assert not controller.state.shown.is_changed
     egg(7.0, 1.0).export(scan_file)
-    qtbot.waitUntil(lambda: controller.state.shown.is_changed, timeout=10_000)
+    qtbot.waitUntil(lambda: controller.state.shown.is_changed, timeout=30_000)
 
 
 def test_exports_of_two_versions_of_a_file_do_not_meet(fitted, qtbot, tmp_path):

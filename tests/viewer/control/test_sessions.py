@@ -95,7 +95,7 @@ def test_what_is_on_screen_is_kept_for_the_next_run(qtbot, egg_atlas, tmp_path):
         controller.open(egg_atlas)
         finish(window, controller)
         window.covariates.value_settled.emit("age", 7.5)
-        qtbot.waitUntil(kept.is_file, timeout=20_000)
+        qtbot.waitUntil(kept.is_file, timeout=30_000)
 
     def second(window, controller) -> None:
         controller.open(egg_atlas)

@@ -22,7 +22,7 @@ def test_what_refers_to_itself_is_freed_after_a_rest(qtbot, open_window, card):
         ring = weakref.ref(Ring())
         assert ring() is not None
         controller.show_atlas(card)
-        qtbot.waitUntil(lambda: ring() is None, timeout=10_000)
+        qtbot.waitUntil(lambda: ring() is None, timeout=30_000)
     finally:
         gc.enable()
 

@@ -122,7 +122,7 @@ def test_synchronous_mode_is_done_when_submit_returns(qtbot):
 def test_cancelling_what_has_not_begun_ends_in_idleness(qtbot, worker, heard):
     """Whoever gets there first, the thread that takes the job or the one that cancels it."""
     for _ in range(50):
-        with qtbot.waitSignal(worker.idle, timeout=2000):
+        with qtbot.waitSignal(worker.idle, timeout=30_000):
             worker.submit(lambda deliver, progress: deliver("late"), heard.append)
             worker.cancel()
     assert heard == []

@@ -28,10 +28,12 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from naisr_viewer.program.headless import pause
 from naisr_viewer.state.explorer import ExplorerState, opened, with_patient
 from naisr_viewer.state.layouts import Layout
 from naisr_viewer.state.patients import Fitted, OpenScan, Reading, Scan
 from naisr_viewer.state.theme import ThemeChoice
+from naisr_viewer.views.drawer import Drawer
 from naisr_viewer.views.elided import ElidedLabel
 from naisr_viewer.views.main_window import MainWindow
 
@@ -90,7 +92,7 @@ def window(qtbot):
 def settle() -> None:
     for _ in range(3):
         QApplication.processEvents()
-        QTest.qWait(10)
+        pause(0.01)
 
 
 def told(widget: QWidget) -> str:
@@ -231,7 +233,8 @@ def stops(window: QWidget, first: QWidget) -> list[QWidget]:
 def region(window: MainWindow, widget: QWidget) -> tuple[int, int]:
     """Which part of the window a widget is in, from left to right and then down; above, in or below what
     scrolls there."""
-    parts = [window.covariates, window.shapes, window.patients, window.statusBar()]
+    (drawer,) = window.findChildren(Drawer)
+    parts = [window.covariates, window.shapes, drawer, window.patients, window.statusBar()]
     part = next(index for index, part in enumerate(parts) if part.isAncestorOf(widget))
     areas = parts[part].findChildren(QScrollArea)
     if not areas or areas[0].isAncestorOf(widget):

@@ -13,6 +13,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel, QScrollArea
 from pytestqt.qtbot import QtBot
 
+from naisr_viewer.program.headless import pause
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState, opened, with_patient, with_value
 from naisr_viewer.state.patients import Fitted, OpenScan, Reading, Scan
@@ -74,7 +75,7 @@ def test_a_drag_moves_on_the_way_and_settles_on_release(panel, heard):
     kind, name, value = heard[-1]
     assert (kind, name) == ("settled", "age")
     assert value == pytest.approx(1 + 0.8 * 219, abs=2)
-    QTest.qWait(2 * SETTLE_MS)
+    pause(2 * SETTLE_MS / 1000)
     assert heard[-1] == (kind, name, value)
 
 
@@ -98,7 +99,7 @@ def test_several_keys_are_one_change(panel, heard, qtbot):
     for _ in range(3):
         QTest.keyClick(slider, Qt.Key.Key_Right)
     assert [kind for kind, _, _ in heard] == ["moved"] * 3
-    qtbot.waitUntil(lambda: heard[-1][0] == "settled", timeout=2000)
+    qtbot.waitUntil(lambda: heard[-1][0] == "settled", timeout=30_000)
     assert heard[-1][2] == heard[2][2]
 
 
@@ -108,7 +109,7 @@ def test_the_wheel_scrolls_and_changes_nothing(panel, heard):
     area = panel.findChild(QScrollArea)
     place = panel.rows["age"].slider.mapTo(panel, panel.rows["age"].slider.rect().center())
     QTest.wheelEvent(panel.windowHandle(), QPointF(place), QPoint(0, -120))
-    QTest.qWait(20)
+    pause(0.02)
     assert heard == [] and area.verticalScrollBar().value() > 0
 
 
@@ -130,7 +131,7 @@ def test_a_typed_number_is_taken_exactly(panel, heard, qtbot):
     QTest.keyClicks(box, "42.5")
     assert heard == []  # not before it is finished
     QTest.keyClick(box, Qt.Key.Key_Return)
-    qtbot.waitUntil(lambda: ("settled", "weight", 42.5) in heard, timeout=2000)
+    qtbot.waitUntil(lambda: ("settled", "weight", 42.5) in heard, timeout=30_000)
 
 
 def test_a_binary_covariate_is_chosen_or_dragged_between(panel, heard):

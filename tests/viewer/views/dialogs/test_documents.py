@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from PySide6.QtTest import QTest
 
 from naisr_model.shipped import shipped
+from naisr_viewer.program.headless import pause
 from naisr_viewer.views.dialogs.documents import DocumentWindow
 
 PAGES = sorted(page.name for page in shipped("docs").glob("*.md"))
@@ -19,7 +19,7 @@ def test_no_page_is_wider_than_its_window(qtbot, width):
     wide = []
     for page in PAGES:
         window.show_page(page)
-        QTest.qWait(20)
+        pause(0.02)
         if window.browser.horizontalScrollBar().maximum() > 0:
             wide.append(page)
     assert PAGES and wide == []

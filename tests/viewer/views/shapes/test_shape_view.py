@@ -18,6 +18,7 @@ from pytestqt.qtbot import QtBot
 
 from naisr_viewer.panels import scan, shape
 from naisr_viewer.panels.kinds import all_panels, kind_of, panels_in, request_for
+from naisr_viewer.program.headless import pause
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState, opened, with_value
 from naisr_viewer.state.layouts import FULL_SHAPE, TEMPLATE, Layout, Panel
@@ -70,7 +71,7 @@ def view(qtbot: QtBot, card: AtlasCard, surfaces: Surfaces) -> Iterator[sv.Shape
 def show(view: sv.ShapeView, surfaces: Surfaces) -> None:
     for result in surfaces.values():
         view.show_surface(result)
-    QTest.qWait(30)
+    pause(0.03)
 
 
 def rows_of_colour(view: sv.ShapeView, colour: str) -> int:
@@ -89,7 +90,7 @@ def drawn_by(view: sv.ShapeView, act) -> list[int]:
     counts: list[int] = []
     view.drawn.connect(counts.append)
     act()
-    QTest.qWait(60)
+    pause(0.06)
     view.drawn.disconnect(counts.append)
     return [count for count in counts if count]
 
@@ -166,7 +167,7 @@ def test_sub_plots_that_are_not_drawn_again_keep_their_pixels(view, surfaces):
     assert len(np.unique(before[template].reshape(-1, 3), axis=0)) > 20
     for step in range(1, 4):
         view.show_surface(moved(surfaces[FULL_SHAPE], 2.0 * step))
-        QTest.qWait(30)
+        pause(0.03)
         now = pixels(view)
         np.testing.assert_array_equal(now[template], before[template])
         assert (now[shape] != before[shape]).any()
@@ -222,8 +223,8 @@ def test_surfaces_shown_before_anything_can_draw_appear_later(qtbot, surfaces, c
     assert not view.is_ready
     view.show()
     show(view, surfaces)
-    qtbot.waitUntil(lambda: view.is_ready, timeout=10_000)
-    QTest.qWait(50)
+    qtbot.waitUntil(lambda: view.is_ready, timeout=30_000)
+    pause(0.05)
     assert rows_of_colour(view, shape.COLOUR) > 50
     view.clear()
 
@@ -267,11 +268,11 @@ def test_the_mouse_turns_all_shapes_at_once_and_draws_once_per_paint(view, card)
     assert canvas.ren_win.GetMultiSamples() == cv.REST_SAMPLES
     assert np.linalg.norm(np.subtract(canvas.camera.position, position)) > 1
     paintings: list[int] = []
-    QTest.qWait(50)
+    pause(0.05)
     view.drawn.connect(paintings.append)
     for _ in range(10):
         canvas.refresh()
-    QTest.qWait(50)
+    pause(0.05)
     view.drawn.disconnect(paintings.append)
     assert paintings == [len(panels_in(Layout.SIDE_BY_SIDE, card))]
 
@@ -295,7 +296,7 @@ def test_another_layout_never_shows_a_sub_plot_beside_its_shape(view):
     camera.parallel_scale *= 0.9
     camera.focal_point, camera.position = camera.focal_point + 2 * shift, camera.position + 2 * shift
     view.show_panels((TEMPLATE, FULL_SHAPE))
-    QTest.qWait(30)
+    pause(0.03)
     for panel in (TEMPLATE, FULL_SHAPE):
         assert (pixels(view)[inside(view, panel)] != rgb(LIGHT.canvas)).any()
 
@@ -303,17 +304,17 @@ def test_another_layout_never_shows_a_sub_plot_beside_its_shape(view):
 def test_the_opening_view_can_be_had_again(view):
     view.look_from("the front")
     view.reset_camera()
-    QTest.qWait(30)
+    pause(0.03)
     opening = pixels(view)
     camera = view.canvas.camera
     camera.roll += 40
     camera.azimuth += 70
     camera.parallel_scale /= 3
     view.canvas.refresh()
-    QTest.qWait(30)
+    pause(0.03)
     assert (pixels(view) != opening).any()
     view.reset_camera()
-    QTest.qWait(30)
+    pause(0.03)
     np.testing.assert_allclose(pixels(view).astype(int), opening, atol=3)
 
 
@@ -322,7 +323,7 @@ def test_a_shape_that_grows_is_not_cut_along_the_words(view):
     view.show_panels((FULL_SHAPE,))
     view.canvas.camera.parallel_scale /= 2
     view.canvas.refresh()
-    QTest.qWait(30)
+    pause(0.03)
     rows, columns = inside(view, FULL_SHAPE)
     seen = (pixels(view)[:, columns] != rgb(LIGHT.canvas)).any(axis=(1, 2))
     assert seen[: rows.start].any() and seen[rows.stop :].any()
@@ -330,13 +331,13 @@ def test_a_shape_that_grows_is_not_cut_along_the_words(view):
 
 def test_a_low_view_scrolls_from_row_to_row(view, card, qtbot):
     view.resize(420, 295)
-    QTest.qWait(30)
+    pause(0.03)
     (bar,) = view.findChildren(QScrollBar)
     assert bar.isVisible()
     seen = set()
     for row in range(bar.maximum() + 1):
         bar.setValue(row)
-        QTest.qWait(30)
+        pause(0.03)
         shown = [panel for panel in panels_in(Layout.SIDE_BY_SIDE, card) if view.title(panel).isVisible()]
         seen |= set(shown)
         for panel in shown:
@@ -393,7 +394,7 @@ def test_no_surface_leaves_the_sub_plot_empty(view, engine, card, atlas, monkeyp
     empty = engine.surface(SurfaceRequest(card.path, TEMPLATE, (), 48))
     for _ in range(2):
         view.show_surface(replace(empty))
-        QTest.qWait(20)
+        pause(0.02)
     canvas = QColor(LIGHT.canvas)
     assert (pixels(view)[inside(view, TEMPLATE)] == (canvas.red(), canvas.green(), canvas.blue())).all()
 
@@ -415,7 +416,7 @@ def views(view, surfaces) -> sv.ShapeView:
     for panel in (FULL_SHAPE, SCAN, UNCERTAINTY, BEFORE, CHANGE):
         view.show_surface(of(surfaces, panel))
     view.look_from("the left")
-    QTest.qWait(30)
+    pause(0.03)
     return view
 
 
@@ -552,7 +553,7 @@ def ghost_of(surfaces: Surfaces, scale: float) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize(("theme", "is_darker"), [(LIGHT, True), (DARK, False)], ids=["light", "dark"])
 def test_a_ghost_lies_over_the_full_shape_alone(views, theme, is_darker, surfaces):
     views.set_theme(theme)
-    QTest.qWait(30)
+    pause(0.03)
     before, bare = pixels(views), middle(views, FULL_SHAPE)
     points_mm, faces = ghost_of(surfaces, 1.1)
     assert drawn_by(views, lambda: views.show_ghost(points_mm, faces)) == [1]
@@ -580,7 +581,7 @@ def test_a_ghost_stays_where_it_is_while_the_shape_moves(views, surfaces):
     start = of(surfaces, FULL_SHAPE)
     for step in (3.0, 6.0):
         views.show_surface(moved(start, step))
-        QTest.qWait(20)
+        pause(0.02)
         assert (pixels(views) != before).any()
     views.show_surface(start)
     np.testing.assert_array_equal(pixels(views), before)
@@ -607,7 +608,7 @@ def test_a_new_atlas_has_no_ghost(views, card, surfaces):
     views.show_ghost(*ghost_of(surfaces, 1.1))
     views.show_atlas(card, LIGHT)
     views.show_panels((FULL_SHAPE, SCAN))
-    QTest.qWait(30)
+    pause(0.03)
     assert (pixels(views)[inside(views, FULL_SHAPE)] == rgb(LIGHT.canvas)).all()
 
 
