@@ -25,10 +25,12 @@ from naisr_viewer.control.worker import Worker
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.files.exports import in_the_way, planned
 from naisr_viewer.panels.kinds import with_layout_of
+from naisr_viewer.panels.scales import fitted_limit, scale_of
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.drawer import Tab
 from naisr_viewer.state.explorer import ExplorerState, followed, opened, reset, reset_all, with_value
 from naisr_viewer.state.layouts import Layout, Panel
+from naisr_viewer.state.overlay import Overlay, Quantity, with_limit
 from naisr_viewer.state.questions import CLOSE_WINDOW, OPEN_ATLAS
 from naisr_viewer.state.requests import ExportChoice, SurfaceResult
 from naisr_viewer.state.theme import ThemeChoice
@@ -205,6 +207,25 @@ class Controller(QObject):
         """Open a page beneath the shapes; None, or the page that is open, closes it."""
         self.go(replace(self.state, drawer=None if tab is self.state.drawer else tab))
 
+    def set_quantity(self, quantity: Quantity) -> None:
+        """Colour the surfaces by something else."""
+        self._see(replace(self.state.overlay, quantity=quantity))
+
+    def set_shared(self, is_shared: bool) -> None:
+        """Whether all surfaces with numbers of one unit share its scale."""
+        self._see(replace(self.state.overlay, is_shared=is_shared))
+
+    def set_limit(self, panel: Panel, limit: float) -> None:
+        """Move the end of a panel's colour scale."""
+        if (scale := scale_of(self.state, panel)) is not None:
+            self._see(with_limit(self.state.overlay, scale.key, limit))
+
+    def fit_limit(self, panel: Panel) -> None:
+        """Let a panel's colour scale end at the largest number that it shows."""
+        limit = fitted_limit(self.state, panel, self.shown)
+        if limit is not None:
+            self.set_limit(panel, limit)
+
     def set_follow(self, follow: bool) -> None:
         """Whether the other covariates follow the one that is moved."""
         self.go(replace(self.state, follow=follow))
@@ -250,6 +271,10 @@ class Controller(QObject):
         window.undo_requested.connect(self.undo)
         window.redo_requested.connect(self.redo)
         window.layout_requested.connect(self.set_layout)
+        window.quantity_chosen.connect(self.set_quantity)
+        window.shared_toggled.connect(self.set_shared)
+        window.shapes.limit_moved.connect(self.set_limit)
+        window.shapes.fit_requested.connect(self.fit_limit)
         window.drawer_requested.connect(self.set_drawer)
         window.theme_requested.connect(self.set_theme)
         window.cancel_requested.connect(self.refinement.cancel)
@@ -263,6 +288,9 @@ class Controller(QObject):
         window.covariates.reset_all_requested.connect(self.reset_all)
         window.covariates.follow_toggled.connect(self.set_follow)
 
+    def _see(self, overlay: Overlay) -> None:
+        self.go(replace(self.state, overlay=overlay))
+
     def _conclude(self, before: ExplorerState, after: ExplorerState) -> None:
         self._timeline.record(before, after)
         self.go(after)
@@ -274,7 +302,7 @@ class Controller(QObject):
             event.ignore()
 
     def _moved(self, before: ExplorerState, name: str, value: float) -> ExplorerState:
-        state = with_value(self.state, name, value)
+        state = replace(with_value(self.state, name, value), touched=name)
         return followed(state, name, before.values) if state.follow else state
 
     def _finish_move(self) -> None:

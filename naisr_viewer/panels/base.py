@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Layout, Panel
+from naisr_viewer.state.overlay import Map
 from naisr_viewer.state.patients import Named
 from naisr_viewer.state.requests import Scale, SurfaceRequest, SurfaceResult
 from naisr_viewer.words.captions import DOUBTFUL, NO_SURFACE, NOT_VALID, UNSEEN, Caption, large
@@ -42,6 +43,7 @@ class PanelKind:
         quantity: what they are, in a file; the name of the kind when left out.
         covariates: whose panels there are, one for each name; one of no covariate when left out.
         is_possible: whether an atlas can show it.
+        is_mapped: whether its surface can be coloured by what covariates do to it.
         is_modelled: whether its surface is the shape model's, in which material points can be found.
     """
 
@@ -57,6 +59,7 @@ class PanelKind:
     quantity: str = ""
     covariates: Callable[[AtlasCard], tuple[str, ...]] = lambda _: ("",)
     is_possible: Callable[[AtlasCard], bool] = lambda _: True
+    is_mapped: bool = False
     is_modelled: bool = True
 
     @property
@@ -82,10 +85,11 @@ def asked(
     values: Named,
     person: int,
     before: tuple[int, Named] | None = None,
+    shown: Map | None = None,
 ) -> SurfaceRequest:
     """A request to the open atlas, see :class:`~naisr_viewer.state.requests.SurfaceRequest`."""
     assert state.atlas is not None
-    return SurfaceRequest(state.atlas.path, panel, values, resolution, person, before)
+    return SurfaceRequest(state.atlas.path, panel, values, resolution, person, before, shown)
 
 
 def caption_of(

@@ -10,6 +10,7 @@ from naisr_model.covariates import growth_path
 from naisr_viewer.state.atlas_card import AtlasCard, RealVector
 from naisr_viewer.state.drawer import Tab, tabs_of
 from naisr_viewer.state.layouts import Layout
+from naisr_viewer.state.overlay import NOTHING_SHOWN, Overlay
 from naisr_viewer.state.patients import Fitted, Named, OpenScan
 from naisr_viewer.state.pins import Pin, Point, with_pin
 
@@ -28,6 +29,8 @@ class ExplorerState:
         compared: key of the one that is compared with; None for the patient as fitted.
         has_ghost: whether the scan is drawn over the full shape.
         pins: places that are marked in all shapes, and told of.
+        overlay: what the surfaces are coloured by.
+        touched: the covariate that was moved last; empty before.
         drawer: the page that is open beneath the shapes; None where it is closed.
         is_atlas_changed: whether the file of the atlas has changed on the disk since it was read.
     """
@@ -41,6 +44,8 @@ class ExplorerState:
     compared: int | None = None
     has_ghost: bool = True
     pins: tuple[Pin, ...] = ()
+    overlay: Overlay = NOTHING_SHOWN
+    touched: str = ""
     drawer: Tab | None = None
     is_atlas_changed: bool = False
 

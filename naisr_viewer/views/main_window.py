@@ -11,6 +11,8 @@ from PySide6.QtWidgets import QApplication, QHBoxLayout, QMainWindow, QWidget
 
 from naisr_model.shipped import shipped
 from naisr_viewer.panels.kinds import visible_panels
+from naisr_viewer.panels.maps import can_map, words_of_maps
+from naisr_viewer.panels.scales import scale_of
 from naisr_viewer.state.drawer import Tab, tabs_of
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.patients import Labels
@@ -81,6 +83,8 @@ class MainWindow(QMainWindow):
     undo_requested = Signal()  # Edit > Undo
     redo_requested = Signal()  # Edit > Redo
     layout_requested = Signal(object)  # a Layout from the View menu or the toolbar
+    quantity_chosen = Signal(object)  # a Quantity that the surfaces shall be coloured by
+    shared_toggled = Signal(bool)  # whether all surfaces with numbers of one unit share its scale
     unpin_requested = Signal()  # Edit > Remove pins
     drawer_requested = Signal(object)  # a Tab of the drawer, or None to close it
     theme_requested = Signal(object)  # a ThemeChoice from the View menu
@@ -139,6 +143,7 @@ class MainWindow(QMainWindow):
         if len(state.patients) > len(old.patients):
             self._actions["patients"].setChecked(True)
         self.show_sides()
+        self._show_maps(state)
         self.shapes.show_panels(visible_panels(state))
         self._show_ghost(state)
         self._actions[f"layout {state.layout}"].setChecked(True)
@@ -151,6 +156,12 @@ class MainWindow(QMainWindow):
         is_open = self._state.atlas is not None
         self.covariates.setVisible(is_open)
         self.patients.setVisible(is_open and self._actions["patients"].isChecked())
+
+    def _show_maps(self, state: ExplorerState) -> None:
+        bar = self._centre.maps
+        bar.setVisible(state.atlas is not None and can_map(state.atlas))
+        bar.show_overlay(state.overlay, words_of_maps(state))
+        self.shapes.show_scales({panel: scale_of(state, panel) for panel in visible_panels(state)})
 
     def _show_ghost(self, state: ExplorerState) -> None:
         scan = state.shown.scan if state.shown and state.has_ghost else None
@@ -357,6 +368,8 @@ class MainWindow(QMainWindow):
         self._recent.file_chosen.connect(self.open_requested)
         self._centre.empty.open_requested.connect(self.ask_atlas)
         self._centre.changed.reopen_requested.connect(self._ask_again)
+        self._centre.maps.quantity_chosen.connect(self.quantity_chosen)
+        self._centre.maps.shared_toggled.connect(self.shared_toggled)
         self._centre.drawer.tab_requested.connect(self.drawer_requested)
         self.patients.open_requested.connect(self.ask_scan)
         self.cancel.clicked.connect(self.cancel_requested)

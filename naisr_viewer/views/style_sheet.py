@@ -77,6 +77,12 @@ def style_sheet(theme: Theme) -> str:
                 background: {t.raised}; border: 1px solid {t.muted}; border-radius: 2px;
                 width: 12px; height: 12px; }}
     #small {{ padding: 1px 8px; font-size: 9pt; }}
+    #mapBar {{ background: {t.window}; border-bottom: 1px solid {t.line}; }}
+    #mapBar QToolButton {{ border: 1px solid {t.line}; padding: 2px 8px; background: {t.raised};
+                color: {t.text}; }}
+    #mapBar QToolButton:hover, #mapBar QToolButton:focus {{ border-color: {t.accent}; }}
+    #mapBar QToolButton:checked {{ background: {t.accent}; color: {t.on_accent}; border-color: {t.accent}; }}
+    #mapBar QToolButton:checked:focus {{ border-color: {t.text}; }}
     #drawer {{ background: {t.window}; border-top: 1px solid {t.line}; }}
     #drawer QToolButton {{ border: 1px solid transparent; border-radius: 4px; padding: 1px 10px;
                 color: {t.muted}; background: transparent; }}

@@ -2,29 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 from PySide6.QtCore import QRect, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QLabel, QWidget
 
 from naisr_viewer.panels.kinds import kind_of, title_of
+from naisr_viewer.panels.scales import PanelScale
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.layouts import Panel
-from naisr_viewer.state.requests import SurfaceResult
+from naisr_viewer.state.requests import Colouring, SurfaceResult
 from naisr_viewer.views.colours import panel_colour
 from naisr_viewer.views.elided import ElidedLabel
 from naisr_viewer.views.shapes.arrangement import CAPTION_PX, TITLE_PX
-from naisr_viewer.views.shapes.colour_bar import HEIGHT_PX, WIDTH_PX, ColourBar
+from naisr_viewer.views.shapes.colour_bar import WIDTH_PX, ColourBar
 
 MARGIN_PX = 10
 DOT_PX = 10
 
 
-def strip_height(panels: Sequence[Panel]) -> int:
-    """Pixels beneath every shape for colour bars; none where no panel has one."""
-    return HEIGHT_PX if any(kind_of(panel).scale for panel in panels) else 0
+def strip_height(cells: Iterable[Cell]) -> int:
+    """Pixels beneath every shape for colour bars; none where no cell has one."""
+    return max((cell.bar.sizeHint().height() for cell in cells if cell.bar and cell.scale), default=0)
 
 
 class Title(ElidedLabel):
@@ -60,13 +61,15 @@ class Cell:
     Attributes:
         title: what stands above.
         caption: the label beneath.
-        bar: what its colours stand for; None where it has none.
+        bar: what its colours stand for; None where it never has any.
+        scale: of its colours; None where it has none now.
         result: the surface, or None as long as there is none.
     """
 
     title: Title
     caption: QLabel
     bar: ColourBar | None
+    scale: PanelScale | None = None
     result: SurfaceResult | None = None
 
     @property
@@ -77,7 +80,38 @@ class Cell:
     @property
     def widgets(self) -> list[QWidget]:
         """All that stands around the shape."""
-        return [self.title, self.caption, *([] if self.bar is None else [self.bar])]
+        return [self.title, self.caption]
+
+    def show_scale(self, scale: PanelScale | None) -> None:
+        """Say what the colours stand for; None where there are none."""
+        self.scale = scale
+        if self.bar is not None and scale is not None:
+            self.bar.show_unit(scale.scale, scale.unit)
+            if self.colouring is not None:
+                self.bar.set_limit(self.colouring.limit)
+
+    @property
+    def colouring(self) -> Colouring | None:
+        """The colours on the surface, to the end of the scale that was chosen."""
+        found = None if self.result is None else self.result.colouring
+        if found is None or self.scale is None or self.scale.limit is None:
+            return found
+        return replace(found, limit=self.scale.limit)
+
+    def show(self, is_seen: bool) -> None:
+        """Show all that stands around the shape, or hide it."""
+        for widget in self.widgets:
+            widget.setVisible(is_seen)
+            widget.raise_()
+        if self.bar is not None:
+            self.bar.setVisible(is_seen and self.scale is not None)
+            self.bar.raise_()
+
+    def discard(self) -> None:
+        """Take it all away."""
+        for widget in (*self.widgets, self.bar):
+            if widget is not None:
+                widget.deleteLater()
 
     def place(self, area: QRect, strip: int) -> None:
         """The title above the shape; beneath it the colour bar, and the caption under that.
@@ -91,7 +125,7 @@ class Cell:
         self.caption.setGeometry(area.left(), top, area.width(), area.bottom() + 1 - top)
         if self.bar is not None:
             width = min(WIDTH_PX, area.width())
-            self.bar.setGeometry(area.left() + (area.width() - width) // 2, top, width, HEIGHT_PX)
+            self.bar.setGeometry(area.left() + (area.width() - width) // 2, top, width, strip)
 
 
 def make_cell(panel: Panel, atlas: AtlasCard, parent: QWidget) -> Cell:
@@ -103,8 +137,8 @@ def make_cell(panel: Panel, atlas: AtlasCard, parent: QWidget) -> Cell:
     caption.setObjectName("caption")
     caption.setWordWrap(True)
     caption.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
-    scale = kind_of(panel).scale
-    bar = None if scale is None else ColourBar(scale, kind_of(panel).unit, parent)
+    kind = kind_of(panel)
+    bar = ColourBar(kind.scale or "signed", kind.unit, parent) if kind.scale or kind.is_mapped else None
     if bar is not None:
         bar.setToolTip(kind_of(panel).hint)
     return Cell(title, caption, bar)

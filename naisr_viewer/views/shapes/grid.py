@@ -38,8 +38,7 @@ class Grid:
     def clear(self) -> None:
         """Take everything away."""
         for cell in self.cells.values():
-            for widget in cell.widgets:
-                widget.deleteLater()
+            cell.discard()
         for line in self._lines:
             line.deleteLater()
         self.cells, self._lines, self._areas = {}, [], {}
@@ -67,10 +66,13 @@ class Grid:
         for panel, cell in self.cells.items():
             if panel in areas:
                 cell.place(areas[panel], strip)
-            for widget in cell.widgets:
-                widget.setVisible(panel in areas)
-                widget.raise_()
+            cell.show(panel in areas)
         self._place_lines(list(areas.values()))
+
+    def show(self) -> None:
+        """Show what the cells that have an area have now."""
+        for panel, cell in self.cells.items():
+            cell.show(panel in self._areas)
 
     def _place_lines(self, areas: Sequence[QRect]) -> None:
         for line in self._lines:

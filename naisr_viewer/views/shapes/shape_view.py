@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +13,7 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
 
 from naisr_viewer.panels.kinds import all_panels
+from naisr_viewer.panels.scales import PanelScale
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.camera import Camera
 from naisr_viewer.state.layouts import FULL_SHAPE, Panel
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
 
 NO_FACES = np.zeros((0, 3), np.int64)
 
+
 Marks = Mapping[Panel, Sequence[tuple[tuple[float, float, float], str]]]
 """Places (mm) and colours (``#rrggbb``) of the dots on each surface."""
 
@@ -42,6 +45,8 @@ class ShapeView(QWidget):
 
     scale_changed = Signal(float)  # pixels per millimetre, after zooming or resizing
     drawn = Signal(int)  # the picture is on its way to the screen; how many sub-plots were drawn anew
+    limit_moved = Signal(object, float)  # a Panel, and what the end of its colour scale shall stand for
+    fit_requested = Signal(object)  # a Panel whose colour scale shall fit what is shown
     clicked = Signal(object, object)  # a short click on a surface: its Panel, and the point there (mm)
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -96,6 +101,10 @@ class ShapeView(QWidget):
         self.prepare()
         self._atlas, self._visible, self._wanted = atlas, (), None
         self._grid.fill(all_panels(atlas), atlas)
+        for panel, cell in self._grid.cells.items():
+            if cell.bar is not None:
+                cell.bar.limit_moved.connect(lambda limit, panel=panel: self.limit_moved.emit(panel, limit))
+                cell.bar.fit_requested.connect(lambda panel=panel: self.fit_requested.emit(panel))
         self._ghost, self._marks = (None, NO_FACES), {}
         self._direction = OBLIQUE
         self._theme = theme
@@ -114,11 +123,23 @@ class ShapeView(QWidget):
         """Replace one surface in place; all that are replaced before Qt paints again share one painting."""
         cell = self._grid.cells[result.request.panel]
         cell.result = result
-        if cell.bar is not None and result.colouring is not None:
-            cell.bar.set_limit(result.colouring.limit)
+        cell.show_scale(cell.scale)
         if self._canvas is not None:
-            self._canvas.set_surface(self._grid.index(result.request.panel), result)
+            self._paint(result.request.panel)
             self._look_after()
+
+    def show_scales(self, scales: Mapping[Panel, PanelScale | None]) -> None:
+        """Say what the colours of surfaces stand for; those left out have none."""
+        had = strip_height(self._grid.cells[panel] for panel in self._visible)
+        for panel, cell in self._grid.cells.items():
+            before = cell.scale
+            cell.show_scale(scales.get(panel))
+            if cell.scale != before and self._canvas is not None:
+                self._paint(panel)
+        if strip_height(self._grid.cells[panel] for panel in self._visible) != had:
+            self._arrange()
+        else:
+            self._grid.show()
 
     def clear_surface(self, panel: Panel) -> None:
         """Show nothing until the next surface comes."""
@@ -223,14 +244,19 @@ class ShapeView(QWidget):
         self._framed = self._looked_after = False
         self.set_theme(self._theme)
         self._canvas.set_moving(self._moving)
-        for index, cell in enumerate(self._grid.cells.values()):
-            if cell.result is not None:
-                self._canvas.set_surface(index, cell.result)
+        for panel in self._grid.cells:
+            self._paint(panel)
         self._canvas.set_ghost(self._grid.index(FULL_SHAPE), *self._ghost)
         for panel in self._marks:
             self._mark(panel)
         self._arrange()
         self._look_after()
+
+    def _paint(self, panel: Panel) -> None:
+        """A surface in the colours of its scale."""
+        cell = self._grid.cells[panel]
+        if cell.result is not None and self._canvas is not None:
+            self._canvas.set_surface(self._grid.index(panel), replace(cell.result, colouring=cell.colouring))
 
     def _mark(self, panel: Panel) -> None:
         if self._canvas is not None:
@@ -292,7 +318,7 @@ class ShapeView(QWidget):
         if not self._visible or not self.width() or not self.height():
             return
         wide_mm, high_mm = self._seen_mm
-        strip = strip_height(self._visible)
+        strip = strip_height(self._grid.cells[panel] for panel in self._visible)
         rows, room = self._rows(strip, wide_mm / high_mm)
         show_rows(self.row_bar, rows)
         places = areas_for(len(self._visible), room, rows, self.row_bar.value())

@@ -44,6 +44,8 @@ class WindowSignals(QObject):
     layout_requested = Signal(object)
     theme_requested = Signal(object)
     drawer_requested = Signal(object)
+    quantity_chosen = Signal(object)
+    shared_toggled = Signal(bool)
     cancel_requested = Signal()
     about_requested = Signal()
     preferences_requested = Signal()
@@ -61,6 +63,8 @@ class PanelSignals(QObject):
 
 class ShapeSignals(QObject):
     drawn = Signal(int)
+    limit_moved = Signal(object, float)
+    fit_requested = Signal(object)
 
 
 def with_signals(fake: Mock, signals: QObject) -> Mock:
