@@ -12,6 +12,7 @@ from naisr_viewer.state.drawer import Tab, tabs_of
 from naisr_viewer.state.layouts import Layout
 from naisr_viewer.state.patients import Fitted, Named, OpenScan
 from naisr_viewer.state.pins import Pin, Point, with_pin
+from naisr_viewer.state.support import NOTHING_CHOSEN, Support, suited
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,7 @@ class ExplorerState:
         has_ghost: whether the scan is drawn over the full shape.
         pins: places that are marked in all shapes, and told of.
         drawer: the page that is open beneath the shapes; None where it is closed.
+        support: over which covariates the data behind the atlas are shown.
         is_atlas_changed: whether the file of the atlas has changed on the disk since it was read.
     """
 
@@ -42,6 +44,7 @@ class ExplorerState:
     has_ghost: bool = True
     pins: tuple[Pin, ...] = ()
     drawer: Tab | None = None
+    support: Support = NOTHING_CHOSEN
     is_atlas_changed: bool = False
 
     @property
@@ -103,7 +106,13 @@ def opened(state: ExplorerState, atlas: AtlasCard) -> ExplorerState:
     layout = Layout.SIDE_BY_SIDE if state.layout.needs_fit else state.layout
     drawer = state.drawer if state.drawer in tabs_of(atlas) else None
     return ExplorerState(
-        atlas, atlas.centre, layout, follow=state.follow, has_ghost=state.has_ghost, drawer=drawer
+        atlas,
+        atlas.centre,
+        layout,
+        follow=state.follow,
+        has_ghost=state.has_ghost,
+        drawer=drawer,
+        support=suited(state.support, atlas),
     )
 
 
@@ -114,6 +123,13 @@ def with_value(state: ExplorerState, name: str, value: float) -> ExplorerState:
     low, high = state.atlas.covariates[index].range
     held = min(max(value, low), high)
     return replace(state, values=(*state.values[:index], held, *state.values[index + 1 :]))
+
+
+def with_values(state: ExplorerState, values: Named) -> ExplorerState:
+    """Several covariates moved (real units), each held inside its observed range."""
+    for name, value in values:
+        state = with_value(state, name, value)
+    return state
 
 
 def followed(state: ExplorerState, name: str, start: RealVector) -> ExplorerState:

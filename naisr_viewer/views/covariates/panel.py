@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QSignalBlocker, QSize, Qt, Signal
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFrame, QLabel, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.views.colours import covariate_colour
 from naisr_viewer.views.covariates.row import CovariateRow
+from naisr_viewer.views.covariates.support import SupportPanel
 from naisr_viewer.views.elided import ElidedCheckBox, ElidedLabel
 from naisr_viewer.views.focus import in_order
 from naisr_viewer.views.theme import Theme
@@ -28,6 +30,9 @@ class CovariatePanel(QFrame):
 
     value_moved = Signal(str, float)  # name, real value: a slider, key or wheel is on the way
     value_settled = Signal(str, float)  # name, real value: it came to rest
+    values_moved = Signal(object)  # Named, real values: covariates that move together are on the way
+    values_settled = Signal(object)  # Named, real values: they came to rest
+    support_requested = Signal(object)  # a Support: the data over other covariates, or folded the other way
     reset_requested = Signal(str)  # name: the row's reset button was pressed
     reset_all_requested = Signal()  # "Reset all" was pressed
     follow_toggled = Signal(bool)  # whether the others shall follow the covariate that is moved
@@ -47,6 +52,10 @@ class CovariatePanel(QFrame):
         self.follow.toggled.connect(self.follow_toggled)
         self.reset_all = QPushButton(self)
         self.reset_all.clicked.connect(self.reset_all_requested)
+        self.support = SupportPanel(self)
+        self.support.values_moved.connect(self.values_moved)
+        self.support.values_settled.connect(self.values_settled)
+        self.support.support_requested.connect(self.support_requested)
         self._area = QScrollArea(self)
         self._rows_area = QVBoxLayout()
         self._rows_area.setSpacing(22)
@@ -82,7 +91,7 @@ class CovariatePanel(QFrame):
     def stops(self) -> list[QWidget]:
         """What the Tab key goes through, as it is read."""
         rows = [stop for row in self.rows.values() for stop in row.stops]
-        return [self._area, *rows, self.follow, self.reset_all]
+        return [self._area, *rows, self.follow, self.reset_all, *self.support.stops]
 
     def show_values(self, state: ExplorerState) -> None:
         """Put every row at its value, and say where home is: the patient's values or the population mean."""
@@ -92,6 +101,7 @@ class CovariatePanel(QFrame):
         for (name, value), home in zip(state.named, state.home, strict=True):
             self.rows[name].set_home(home, fit is not None, intervals.get(name))
             self.rows[name].set_value(value)
+        self._show_support(state)
         with QSignalBlocker(self.follow):
             self.follow.setChecked(state.follow)
         self.reset_all.setText("Reset all" if fit is None else "Back to the patient")
@@ -102,15 +112,38 @@ class CovariatePanel(QFrame):
         """Say no more of movements that have not come to rest."""
         for row in self.rows.values():
             row.forget_move()
+        self.support.forget_move()
 
     def set_theme(self, theme: Theme) -> None:
         """Follow the theme."""
+        self.support.set_theme(theme)
         for row in self.rows.values():
             row.set_colours(theme)
 
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """There may be room for the data now."""
+        super().resizeEvent(event)
+        self._show_room()
+
+    def _show_support(self, state: ExplorerState) -> None:
+        """Say where the data are, of each covariate while the others are as they are."""
+        if state.atlas is not None:
+            values = dict(state.named)
+            for name, row in self.rows.items():
+                row.show_stretches(state.atlas.population.stretches_with_data(name, values))
+        self.support.show_state(state)
+        self._show_room()
+
+    def _show_room(self) -> None:
+        """Say how high the data can be before the sliders have to be scrolled."""
+        width = self._area.viewport().width()
+        height = self._column.totalMinimumHeightForWidth(width)
+        mine = 0 if self.support.isHidden() else self.support.minimumSizeHint().height()
+        self.support.show_room(self._area.viewport().height() - height + mine)
+
     def _compose(self) -> None:
         inside = QWidget(self)
-        column = QVBoxLayout(inside)
+        self._column = column = QVBoxLayout(inside)
         column.setContentsMargins(14, 16, 14, 16)
         column.setSpacing(4)
         column.addWidget(self.title)
@@ -121,7 +154,9 @@ class CovariatePanel(QFrame):
         column.addWidget(self.follow)
         column.addSpacing(10)
         column.addWidget(self.reset_all)
-        column.addStretch(1)
+        column.addSpacing(14)
+        column.addWidget(self.support, 1)
+        column.addStretch(0)
         self.follow.setVisible(False)
         self.reset_all.setVisible(False)
         self._area.setWidget(inside)
