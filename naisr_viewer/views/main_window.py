@@ -305,7 +305,8 @@ class MainWindow(QMainWindow):
         return ask_label(self, labels)
 
     def grab_image(self) -> QImage:
-        """The whole window as a picture."""
+        """The whole window as a picture, with all that it will have in a moment."""
+        self._prepare_charts()
         return self.grab().toImage()
 
     def closeEvent(self, event: QCloseEvent) -> None:

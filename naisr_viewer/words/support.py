@@ -14,11 +14,6 @@ HINT = (
 )
 
 
-def titled(covariate: Covariate, title: str) -> str:
-    """What a covariate is called along an axis: ``Age (months)``."""
-    return f"{title} ({covariate.unit})" if covariate.unit else title
-
-
 def along(covariate: Covariate, stretches: tuple[tuple[float, float], ...]) -> str:
     """Where along a slider there are data: ``data from 52 to 180 months``."""
     if not stretches:

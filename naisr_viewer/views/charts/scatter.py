@@ -6,8 +6,8 @@ import contourpy
 import numpy as np
 import pyqtgraph
 from numpy.typing import NDArray
-from PySide6.QtCore import QPointF, QRectF, Qt, QTimer, Signal
-from PySide6.QtGui import QBrush, QColor, QKeyEvent, QMouseEvent, QPen
+from PySide6.QtCore import QPointF, QRect, QRectF, Qt, QTimer, Signal
+from PySide6.QtGui import QBrush, QColor, QKeyEvent, QMouseEvent, QPainter, QPen
 from PySide6.QtWidgets import QGraphicsEllipseItem, QWidget
 
 from naisr_model.covariates import Covariate
@@ -169,6 +169,19 @@ class Scatter(Chart):
     def place_of(self, x: float, y: float) -> QPointF:
         """Where real values are, in pixels of the widget."""
         return QPointF(self.mapFromScene(self.plotItem.vb.mapViewToScene(QPointF(x, y))))
+
+    def drawForeground(self, painter: QPainter, rect: QRectF | QRect) -> None:
+        """The units at the far ends of the axes."""
+        super().drawForeground(painter, rect)
+        if self._covariates is None:
+            return
+        room = self.plotItem.vb.sceneBoundingRect().adjusted(5, 2, -5, -2)
+        painter.setPen(QColor(self._theme.muted))
+        ends = (Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignBottom, Qt.AlignmentFlag.AlignLeft)
+        for covariate, end in zip(self._covariates, ends, strict=True):
+            painter.drawText(
+                room, end, shortened(covariate.unit, self.fontMetrics(), round(room.width() / 2))
+            )
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Take hold of the ring, or have it come."""

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QSignalBlocker, QSize, Qt, Signal
-from PySide6.QtGui import QResizeEvent
+from PySide6.QtCore import QEvent, QObject, QSignalBlocker, QSize, Qt, Signal
 from PySide6.QtWidgets import QFrame, QLabel, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
 from naisr_viewer.state.atlas_card import AtlasCard
@@ -120,10 +119,11 @@ class CovariatePanel(QFrame):
         for row in self.rows.values():
             row.set_colours(theme)
 
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        """There may be room for the data now."""
-        super().resizeEvent(event)
-        self._show_room()
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """There may be room for the data now, or none any more."""
+        if event.type() in (QEvent.Type.Resize, QEvent.Type.LayoutRequest):
+            self._show_room()
+        return super().eventFilter(watched, event)
 
     def _show_support(self, state: ExplorerState) -> None:
         """Say where the data are, of each covariate while the others are as they are."""
@@ -132,7 +132,6 @@ class CovariatePanel(QFrame):
             for name, row in self.rows.items():
                 row.show_stretches(state.atlas.population.stretches_with_data(name, values))
         self.support.show_state(state)
-        self._show_room()
 
     def _show_room(self) -> None:
         """Say how high the data can be before the sliders have to be scrolled."""
@@ -154,13 +153,15 @@ class CovariatePanel(QFrame):
         column.addWidget(self.follow)
         column.addSpacing(10)
         column.addWidget(self.reset_all)
-        column.addSpacing(14)
+        column.addSpacing(6)
         column.addWidget(self.support, 1)
         column.addStretch(0)
         self.follow.setVisible(False)
         self.reset_all.setVisible(False)
         self._area.setWidget(inside)
         self._area.setWidgetResizable(True)
+        for part in (self._area.viewport(), inside):
+            part.installEventFilter(self)
         self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         outer = QVBoxLayout(self)
         outer.setContentsMargins(0, 0, 1, 0)

@@ -86,6 +86,7 @@ class SupportPanel(QWidget):
         self.chart.place_moved.connect(lambda *place: self.values_moved.emit(self._named(place)))
         self.chart.place_settled.connect(lambda *place: self.values_settled.emit(self._named(place)))
         self._inside.insertWidget(1, self.chart, 1)
+        self.chart.show()  # a layout does so by the next event only
         in_order(self.stops)
         self.show_state(self._state)
 
@@ -157,7 +158,7 @@ class SupportPanel(QWidget):
 
     def _show_axes(self) -> None:
         assert self._state.atlas is not None
-        choices = [(one.name, words.titled(one, label(one.name))) for one in self._state.atlas.covariates]
+        choices = [(one.name, label(one.name)) for one in self._state.atlas.covariates]
         self.along.show_choices(choices, self._support.x)
         self.upwards.show_choices(choices, self._support.y)
 
