@@ -85,6 +85,7 @@ def style_sheet(theme: Theme) -> str:
     #chart {{ border: 1px solid {t.line}; border-radius: 5px; }}
     #chart:focus {{ border-color: {t.accent}; }}
     #fold {{ border: 1px solid transparent; border-radius: 4px; font-weight: 600; padding: 2px; }}
+    #fold:focus {{ border-color: {t.accent}; }}
     #section {{ font-size: 11pt; font-weight: 600; }}
     #figure {{ font-weight: 600; }}
     #changed {{ background: {t.raised}; border: 1px solid {t.accent}; border-radius: 6px; }}

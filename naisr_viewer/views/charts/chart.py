@@ -29,6 +29,7 @@ class Chart(pyqtgraph.PlotWidget):
         self.setObjectName("chart")
         self.setAntialiasing(True)
         self.plotItem.hideButtons()
+        self.plotItem.ctrlMenu.setParent(self)  # it is never shown, and would outlive the chart
         self.plotItem.setMouseEnabled(False, False)
         for side in SIDES:
             self.plotItem.getAxis(side).setStyle(tickLength=-TICK_PX, hideOverlappingLabels=True)

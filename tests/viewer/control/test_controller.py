@@ -54,6 +54,9 @@ class WindowSignals(QObject):
 class PanelSignals(QObject):
     value_moved = Signal(str, float)
     value_settled = Signal(str, float)
+    values_moved = Signal(object)
+    values_settled = Signal(object)
+    support_requested = Signal(object)
     reset_requested = Signal(str)
     reset_all_requested = Signal()
     follow_toggled = Signal(bool)
