@@ -1,0 +1,108 @@
+"""The data beneath the sliders and along them, alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor
+from PySide6.QtTest import QTest
+from pytestqt.qtbot import QtBot
+
+from naisr_viewer.state.explorer import ExplorerState, opened, with_values
+from naisr_viewer.state.support import Support
+from naisr_viewer.views.covariates.panel import PANEL_WIDTH, CovariatePanel
+from naisr_viewer.views.covariates.slider import share_of, track_x
+from naisr_viewer.views.theme import LIGHT
+
+HIGH_PX, LOW_PX = 900, 420
+
+
+@pytest.fixture
+def panel(qtbot: QtBot, card) -> CovariatePanel:
+    panel = CovariatePanel()
+    qtbot.addWidget(panel)
+    panel.show_atlas(card, LIGHT)
+    panel.show_values(opened(ExplorerState(), card))
+    panel.resize(PANEL_WIDTH, HIGH_PX)
+    panel.show()
+    qtbot.waitExposed(panel)
+    panel.support.prepare()
+    return panel
+
+
+@pytest.fixture
+def asked(panel) -> list[Support]:
+    found: list[Support] = []
+    panel.support_requested.connect(found.append)
+    return found
+
+
+def test_the_data_are_folded_where_there_is_no_room(panel, card, qtbot):
+    support = panel.support
+    assert support.chart.isVisible()
+    panel.resize(PANEL_WIDTH, LOW_PX)
+    qtbot.waitUntil(lambda: not support.chart.isVisible(), timeout=2000)
+    panel.resize(PANEL_WIDTH, HIGH_PX)
+    qtbot.waitUntil(support.chart.isVisible, timeout=2000)
+    panel.show_values(replace(opened(ExplorerState(), card), support=Support("age", "weight", False)))
+    assert not support.chart.isVisible()
+    panel.resize(PANEL_WIDTH, LOW_PX)
+    panel.show_values(replace(opened(ExplorerState(), card), support=Support("age", "weight", True)))
+    assert support.chart.isVisible()  # to be scrolled to; the sliders keep their place
+    slider = panel.rows["age"].slider
+    assert slider.visibleRegion().boundingRect() == slider.rect()
+
+
+def test_folding_and_axes_are_asked_for(panel, asked, card):
+    QTest.mouseClick(panel.support.fold, Qt.MouseButton.LeftButton)
+    assert asked == [Support("age", "weight", False)] and panel.support.chart.isVisible()
+    QTest.keyClick(panel.support.along, Qt.Key.Key_Down)  # from age to weight: they change places
+    assert asked[-1] == Support("weight", "age")
+    panel.show_values(replace(opened(ExplorerState(), card), support=Support("sex", "weight")))
+    assert [panel.support.along.currentText(), panel.support.upwards.currentText()] == ["Sex", "Weight"]
+    assert len(asked) == 2
+
+
+def test_an_atlas_of_one_covariate_has_no_scatter(panel, card):
+    population = card.population.keeping({"age"})
+    of_one = replace(card, covariates=population.covariates, population=population)
+    panel.show_atlas(of_one, LIGHT)
+    panel.show_values(opened(ExplorerState(), of_one))
+    assert not panel.support.isVisible()
+
+
+def test_the_ring_moves_both_covariates(panel, card):
+    moved: list[tuple] = []
+    panel.values_settled.connect(moved.append)
+    chart = panel.support.chart
+    QTest.mouseClick(chart.viewport(), Qt.MouseButton.LeftButton, pos=chart.place_of(160, 50).toPoint())
+    (((x, age), (y, weight)),) = moved
+    assert (x, y) == ("age", "weight")
+    assert (age, weight) == pytest.approx((160, 50), abs=1.5)
+
+
+@pytest.mark.parametrize("weight", [20.0, 60.0, 95.0])
+def test_the_groove_is_solid_where_there_are_data(panel, card, weight):
+    """Pixels along the groove of age against what the population says of each place."""
+    state = with_values(opened(ExplorerState(), card), (("age", 1.0), ("weight", weight)))
+    panel.show_values(state)
+    slider, age = panel.rows["age"].slider, card.covariates[0]
+    image = slider.grab().toImage()
+    ratio, middle = image.devicePixelRatio(), image.height() // 2
+    for value in np.linspace(1, 220, 60)[8:]:  # clear of the handle
+        x = round(track_x(share_of(age, value), slider.width()) * ratio)
+        ends = {card.population.has_data_at({"age": value + step, "weight": weight}) for step in (-4, 4)}
+        inked = [image.pixelColor(x + i, middle + j) == QColor(LIGHT.line) for i in (0, 1) for j in (-1, 0)]
+        if len(ends) == 1:
+            assert all(inked) == ends.pop(), value
+
+
+def test_the_slider_says_where_there_are_data(panel, card):
+    panel.show_values(with_values(opened(ExplorerState(), card), (("weight", 95.0),)))
+    assert "No data anywhere along" in panel.rows["age"].slider.toolTip()
+    panel.show_values(opened(ExplorerState(), card))
+    ((low, high),) = card.population.stretches_with_data("age", {})
+    assert f"{low:.0f} to {high:.0f} months" in panel.rows["age"].slider.toolTip()
