@@ -13,6 +13,7 @@ from naisr_viewer.views.theme import Theme
 
 SIDES = ("left", "bottom")
 TICK_PX = 4
+MARGINS_PX = (4, 2, 6, 2)
 
 pyqtgraph.setConfigOption("exitCleanup", False)  # a window frees its charts itself, at its own time
 
@@ -29,7 +30,9 @@ class Chart(pyqtgraph.PlotWidget):
         self.setObjectName("chart")
         self.setAntialiasing(True)
         self.plotItem.hideButtons()
-        self.plotItem.ctrlMenu.setParent(self)  # it is never shown, and would outlive the chart
+        self.plotItem.setContentsMargins(*MARGINS_PX)
+        menu = self.plotItem.ctrlMenu
+        menu.setParent(self, menu.windowFlags())  # it is never shown, and would outlive the chart
         self.plotItem.setMouseEnabled(False, False)
         for side in SIDES:
             self.plotItem.getAxis(side).setStyle(tickLength=-TICK_PX, hideOverlappingLabels=True)

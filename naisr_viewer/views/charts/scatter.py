@@ -7,7 +7,7 @@ import numpy as np
 import pyqtgraph
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRect, QRectF, Qt, QTimer, Signal
-from PySide6.QtGui import QBrush, QColor, QKeyEvent, QMouseEvent, QPainter, QPen
+from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPen
 from PySide6.QtWidgets import QGraphicsEllipseItem, QWidget
 
 from naisr_model.covariates import Covariate
@@ -159,7 +159,6 @@ class Scatter(Chart):
         self._threads.setPen(pyqtgraph.mkPen(thread, width=1))
         self._edge.setPen(pyqtgraph.mkPen(theme.muted, width=1.2))
         self._ring.setPen(QPen(QColor(theme.accent), 2.5))
-        self._ring.setBrush(QBrush(QColor(theme.raised)))
 
     def forget_move(self) -> None:
         """Say no more of a movement that has not come to rest."""

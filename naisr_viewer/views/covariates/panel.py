@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QEvent, QObject, QSignalBlocker, QSize, Qt, Signal
-from PySide6.QtWidgets import QFrame, QLabel, QPushButton, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QFrame, QLabel, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState
@@ -55,6 +55,7 @@ class CovariatePanel(QFrame):
         self.support.values_moved.connect(self.values_moved)
         self.support.values_settled.connect(self.values_settled)
         self.support.support_requested.connect(self.support_requested)
+        self.support.fold.clicked.connect(self._scroll_to_support, Qt.ConnectionType.QueuedConnection)
         self._area = QScrollArea(self)
         self._rows_area = QVBoxLayout()
         self._rows_area.setSpacing(22)
@@ -139,6 +140,11 @@ class CovariatePanel(QFrame):
         height = self._column.totalMinimumHeightForWidth(width)
         mine = 0 if self.support.isHidden() else self.support.minimumSizeHint().height()
         self.support.show_room(self._area.viewport().height() - height + mine)
+
+    def _scroll_to_support(self) -> None:
+        """Bring into sight what was unfolded, once it has its place."""
+        QApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest.value)
+        self._area.ensureWidgetVisible(self.support, 0, 0)
 
     def _compose(self) -> None:
         inside = QWidget(self)

@@ -73,6 +73,12 @@ def test_people_of_one_level_are_told_apart_near_it(card):
     assert len(set(places[:, 1])) == len(places)
 
 
+def test_nothing_lies_over_the_dots(scatter):
+    scatter.hide()
+    scatter.show()
+    assert [child for child in scatter.findChildren(QWidget) if child.isVisible()] == [scatter.viewport()]
+
+
 def test_the_ring_is_dragged(scatter, heard):
     start = at(scatter, 100, 35) + QPoint(3, -2)  # nobody hits its middle
     QTest.mousePress(scatter.viewport(), LEFT, pos=start)

@@ -53,7 +53,7 @@ def test_the_data_are_folded_where_there_is_no_room(panel, card, qtbot):
     panel.show_values(replace(opened(ExplorerState(), card), support=Support("age", "weight", True)))
     assert support.chart.isVisible()  # to be scrolled to; the sliders keep their place
     slider = panel.rows["age"].slider
-    assert slider.visibleRegion().boundingRect() == slider.rect()
+    qtbot.waitUntil(lambda: slider.visibleRegion().boundingRect() == slider.rect(), timeout=2000)
 
 
 def test_folding_and_axes_are_asked_for(panel, asked, card):
