@@ -176,10 +176,8 @@ def without_patient(state: ExplorerState, key: int) -> ExplorerState:
 def showing(state: ExplorerState, key: int | None) -> ExplorerState:
     """Another patient, at what is known or found of them; None for the population average."""
     state = with_possible_layout(replace(state, patient=key))
-    state = replace(state, values=state.home)
-    for name, value in state.shown.known if state.shown and not state.fit else ():
-        state = with_value(state, name, value)
-    return state
+    known = state.shown.known if state.shown and not state.fit else ()
+    return with_values(replace(state, values=state.home), known)
 
 
 def pinned(state: ExplorerState, origin_mm: Point) -> ExplorerState:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,8 +12,10 @@ from PySide6.QtGui import QColor
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
-from naisr_viewer.state.explorer import ExplorerState, opened, with_values
+from naisr_viewer.state.explorer import ExplorerState, opened, with_patient, with_values
+from naisr_viewer.state.patients import OpenScan, Reading, Scan
 from naisr_viewer.state.support import Support
+from naisr_viewer.views.colours import patient_colour
 from naisr_viewer.views.covariates.panel import PANEL_WIDTH, CovariatePanel
 from naisr_viewer.views.covariates.slider import share_of, track_x
 from naisr_viewer.views.theme import LIGHT
@@ -106,3 +109,35 @@ def test_the_slider_says_where_there_are_data(panel, card):
     panel.show_values(opened(ExplorerState(), card))
     ((low, high),) = card.population.stretches_with_data("age", {})
     assert f"{low:.0f} to {high:.0f} months" in panel.rows["age"].slider.toolTip()
+
+
+def test_the_edge_follows_the_covariates_that_are_not_on_the_axes(panel, card, qtbot):
+    state = replace(opened(ExplorerState(), card), support=Support("age", "sex"))
+    panel.show_values(state)
+    qtbot.wait(50)  # the axes take their room
+    before = panel.support.chart.grab().toImage()
+    panel.show_values(with_values(state, (("weight", 60.0),)))
+    qtbot.waitUntil(lambda: panel.support.chart.grab().toImage() != before, timeout=2000)
+    nobody = with_values(state, (("weight", 95.0),))
+    panel.show_values(replace(nobody, support=Support("sex", "age")))  # without an edge
+    panel.support.chart.grab()
+    panel.show_values(state)
+    qtbot.waitUntil(lambda: panel.support.chart.grab().toImage() == before, timeout=2000)
+
+
+def test_a_patient_is_told_from_others_by_colour(panel, card, qtbot):
+    """As in the list of the patients."""
+    state = opened(ExplorerState(), card)
+    corners = np.zeros((3, 3), np.float32)
+    scan = Scan(corners, corners, np.zeros((0, 3), np.int64), "p.stl")
+    places = {1: (60.0, 15.0), 2: (190.0, 50.0)}
+    for key, (age, weight) in places.items():
+        known = (("age", age), ("weight", weight))
+        state = with_patient(state, OpenScan(key, f"{key}.stl", Reading(Path("p.stl")), scan, known))
+    panel.show_values(replace(state, patient=None, values=card.centre))
+    chart = panel.support.chart
+    image = chart.grab().toImage()
+    ratio = image.devicePixelRatio()
+    for key, place in places.items():
+        middle = (chart.place_of(*place) * ratio).toPoint()
+        assert image.pixelColor(middle) == QColor(patient_colour(key))
