@@ -92,7 +92,7 @@ def suited(support: Support, atlas: AtlasCard) -> Support:
     Continuous covariates come before binary ones.
     """
     names = [covariate.name for covariate in atlas.covariates]
-    if support.x in names and support.y in names:
+    if support.x in names and support.y in names and support.x != support.y:
         return support
     first = sorted(atlas.covariates, key=lambda covariate: covariate.kind == "binary")
     x, y = [*(covariate.name for covariate in first), "", ""][:2]
