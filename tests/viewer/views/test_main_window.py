@@ -92,6 +92,8 @@ def test_the_ring_among_the_data_is_dragged_like_both_sliders(ready, qtbot, atla
     qtbot.waitUntil(lambda: window.covariates.support.chart is not None, timeout=5000)
     chart = window.covariates.support.chart
     qtbot.waitUntil(chart.isVisible, timeout=5000)
+    wait_idle(qtbot, controller)
+    QTest.qWait(50)  # the axes take their room
     start, goal = chart.place_of(100, 35).toPoint(), chart.place_of(180, 62).toPoint()
     QTest.mousePress(chart.viewport(), Qt.MouseButton.LeftButton, pos=start)
     for step in range(1, 11):
