@@ -13,6 +13,9 @@ from naisr_viewer.views.theme import Theme
 
 SIDES = ("left", "bottom")
 TICK_PX = 4
+NUMBER_PX = 24
+"""Room for the numbers of an axis; longer ones take more."""
+
 MARGINS_PX = (4, 2, 6, 2)
 
 pyqtgraph.setConfigOption("exitCleanup", False)  # a window frees its charts itself, at its own time
@@ -35,8 +38,10 @@ class Chart(pyqtgraph.PlotWidget):
         menu.setParent(self, menu.windowFlags())  # it is never shown, and would outlive the chart
         self.plotItem.setMouseEnabled(False, False)
         for side in SIDES:
-            self.plotItem.getAxis(side).setStyle(tickLength=-TICK_PX, hideOverlappingLabels=True)
-            self.plotItem.getAxis(side).enableAutoSIPrefix(False)
+            axis = self.plotItem.getAxis(side)
+            axis.setStyle(tickLength=-TICK_PX, hideOverlappingLabels=True, tickTextWidth=NUMBER_PX)
+            axis.setStyle(autoReduceTextSpace=False)  # else the axes move under a hand that drags
+            axis.enableAutoSIPrefix(False)
 
     def set_theme(self, theme: Theme) -> None:
         """Colour ground and axes."""

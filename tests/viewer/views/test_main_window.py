@@ -99,7 +99,8 @@ def test_the_ring_among_the_data_is_dragged_like_both_sliders(ready, qtbot, atla
     for step in range(1, 11):
         QTest.mouseMove(chart.viewport(), start + (goal - start) * step / 10)
         QTest.qWait(5)
-    assert controller.is_moving and "Preview" in window.status.text()
+    qtbot.waitUntil(lambda: "Preview" in window.status.text(), timeout=5000)
+    assert controller.is_moving
     QTest.mouseRelease(chart.viewport(), Qt.MouseButton.LeftButton, pos=goal)
     wait_idle(qtbot, controller)
     age, weight, _ = moved = controller.state.values
