@@ -749,6 +749,24 @@ class Fit:
         return {one.name: self._interval(column, one) for column, one in columns if one.name in self.inferred}
 
     @property
+    def covariances(self) -> dict[tuple[str, str], float]:
+        """Of the inferred continuous covariates, about the values told, in the product of their units.
+
+        All explanations together: ``sum_k p_k (S_k + (m_k - m)(m_k - m)^T)`` with the probability p_k of
+        each, its covariance S_k and its values m_k.
+        """
+        told, free = self.results[0].covariates, self.results[0].free
+        offsets = np.array([result.covariates - told for result in self.results])[:, free]
+        within = np.einsum("k,kij->ij", self._shares, np.array([result.spread for result in self.results]))
+        across = within + (offsets.T * self._shares) @ offsets
+        chosen = [self.individual.atlas.covariates[column] for column in free]
+        return {
+            (one.name, other.name): float(across[i, j] * one.scale * other.scale)
+            for i, one in enumerate(chosen)
+            for j, other in enumerate(chosen)
+        }
+
+    @property
     def lasting(self) -> float:
         """Share of the code that is kept far from the fitted covariates: what two visits have in common."""
         return self.individual.posterior.problem.prior.lasting

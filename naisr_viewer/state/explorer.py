@@ -13,6 +13,7 @@ from naisr_viewer.state.layouts import Layout
 from naisr_viewer.state.overlay import NOTHING_SHOWN, Overlay
 from naisr_viewer.state.patients import Fitted, Named, OpenScan
 from naisr_viewer.state.pins import Pin, Point, with_pin
+from naisr_viewer.state.support import NOTHING_CHOSEN, Support, suited
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,7 @@ class ExplorerState:
         overlay: what the surfaces are coloured by.
         touched: the covariate that was moved last; empty before.
         drawer: the page that is open beneath the shapes; None where it is closed.
+        support: over which covariates the data behind the atlas are shown.
         is_atlas_changed: whether the file of the atlas has changed on the disk since it was read.
     """
 
@@ -47,6 +49,7 @@ class ExplorerState:
     overlay: Overlay = NOTHING_SHOWN
     touched: str = ""
     drawer: Tab | None = None
+    support: Support = NOTHING_CHOSEN
     is_atlas_changed: bool = False
 
     @property
@@ -108,7 +111,13 @@ def opened(state: ExplorerState, atlas: AtlasCard) -> ExplorerState:
     layout = Layout.SIDE_BY_SIDE if state.layout.needs_fit else state.layout
     drawer = state.drawer if state.drawer in tabs_of(atlas) else None
     return ExplorerState(
-        atlas, atlas.centre, layout, follow=state.follow, has_ghost=state.has_ghost, drawer=drawer
+        atlas,
+        atlas.centre,
+        layout,
+        follow=state.follow,
+        has_ghost=state.has_ghost,
+        drawer=drawer,
+        support=suited(state.support, atlas),
     )
 
 
@@ -119,6 +128,13 @@ def with_value(state: ExplorerState, name: str, value: float) -> ExplorerState:
     low, high = state.atlas.covariates[index].range
     held = min(max(value, low), high)
     return replace(state, values=(*state.values[:index], held, *state.values[index + 1 :]))
+
+
+def with_values(state: ExplorerState, values: Named) -> ExplorerState:
+    """Several covariates moved (real units), each held inside its observed range."""
+    for name, value in values:
+        state = with_value(state, name, value)
+    return state
 
 
 def followed(state: ExplorerState, name: str, start: RealVector) -> ExplorerState:
@@ -165,10 +181,8 @@ def without_patient(state: ExplorerState, key: int) -> ExplorerState:
 def showing(state: ExplorerState, key: int | None) -> ExplorerState:
     """Another patient, at what is known or found of them; None for the population average."""
     state = with_possible_layout(replace(state, patient=key))
-    state = replace(state, values=state.home)
-    for name, value in state.shown.known if state.shown and not state.fit else ():
-        state = with_value(state, name, value)
-    return state
+    known = state.shown.known if state.shown and not state.fit else ()
+    return with_values(replace(state, values=state.home), known)
 
 
 def pinned(state: ExplorerState, origin_mm: Point) -> ExplorerState:

@@ -9,6 +9,7 @@ from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.camera import Camera
 from naisr_viewer.state.explorer import ExplorerState, with_possible_layout
 from naisr_viewer.state.patients import Named, OpenScan, Reading
+from naisr_viewer.state.support import suited
 
 
 @dataclass(frozen=True)
@@ -100,6 +101,7 @@ def state_of(session: Session, card: AtlasCard, patients: tuple[OpenScan, ...]) 
             patients=patients,
             patient=state.patient if state.patient in keys else None,
             compared=state.compared if state.compared in keys else None,
+            support=suited(state.support, card),
         )
     )
 

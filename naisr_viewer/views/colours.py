@@ -14,6 +14,9 @@ COVARIATE_COLOURS = ("#e29a3b", "#4fae86", "#c0699f", "#46a9bd", "#d0694f", "#8f
 PIN_COLOURS = ("#d6246e", "#1f6fd6", "#4b2a8c")
 """Of the first, second and third pinned place; told from the shapes and from one another."""
 
+PATIENT_COLOURS = ("#d6453d", "#1f9e8c", "#7a5cd0", "#b07d10", "#c2479a", "#5f8a1e")
+"""Of the patients that are open, wherever they are points among others; repeated beyond six."""
+
 SCALE_COLOURS: dict[Scale, tuple[str, ...]] = {
     "signed": (
         "#2957a8", "#4379c4", "#6b9bd3", "#9bb9d8", "#d1d5d8", "#d7b092", "#d3885a", "#c55f28", "#aa3600",
@@ -40,6 +43,11 @@ def panel_colour(atlas: AtlasCard, panel: Panel) -> str:
 def pin_colour(number: int) -> str:
     """The colour of a pinned place, on the shapes and where it is told of."""
     return PIN_COLOURS[(number - 1) % len(PIN_COLOURS)]
+
+
+def patient_colour(key: int) -> str:
+    """The colour of an open patient among others."""
+    return PATIENT_COLOURS[(key - 1) % len(PATIENT_COLOURS)]
 
 
 def ghost_colour(theme: Theme) -> str:

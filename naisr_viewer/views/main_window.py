@@ -316,7 +316,8 @@ class MainWindow(QMainWindow):
         return ask_label(self, labels)
 
     def grab_image(self) -> QImage:
-        """The whole window as a picture."""
+        """The whole window as a picture, with all that it will have in a moment."""
+        self._prepare_charts()
         return self.grab().toImage()
 
     def closeEvent(self, event: QCloseEvent) -> None:
@@ -374,7 +375,15 @@ class MainWindow(QMainWindow):
         self.patients.open_requested.connect(self.ask_scan)
         self.cancel.clicked.connect(self.cancel_requested)
         self.shapes.scale_changed.connect(self.scale.set_scale)
+        # Queued, so that the picture has reached the screen before charts are made.
+        self.shapes.drawn.connect(self._prepare_charts, Qt.ConnectionType.QueuedConnection)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._system_theme_changed)
+
+    def _prepare_charts(self) -> None:
+        """Once, after the first picture."""
+        if self.covariates.support.chart is None:
+            self.covariates.support.prepare()
+            in_order(self._stops)
 
     def _system_theme_changed(self) -> None:
         if self._theme_choice is ThemeChoice.SYSTEM:

@@ -65,14 +65,14 @@ def style_sheet(theme: Theme) -> str:
     QScrollBar:vertical:focus {{ background: {t.accent}; }}
     QScrollBar::add-line, QScrollBar::sub-line {{ height: 0; }}
     QScrollBar::add-page, QScrollBar::sub-page {{ background: transparent; }}
-    #patientBar QComboBox {{ background: {t.raised}; border: 1px solid {t.line}; border-radius: 5px;
+    ChoiceBox {{ background: {t.raised}; border: 1px solid {t.line}; border-radius: 5px;
                 padding: 3px 8px; color: {t.text}; }}
-    #patientBar QComboBox:hover, #patientBar QComboBox:focus {{ border-color: {t.accent}; }}
-    #patientBar QComboBox:disabled {{ color: {t.muted}; background: {t.window}; }}
-    #patientBar QComboBox::drop-down {{ border: none; width: 20px; }}
-    #patientBar QComboBox QAbstractItemView {{ background: {t.raised}; border: 1px solid {t.line};
+    ChoiceBox:hover, ChoiceBox:focus {{ border-color: {t.accent}; }}
+    ChoiceBox:disabled {{ color: {t.muted}; background: {t.window}; }}
+    ChoiceBox::drop-down {{ border: none; width: 20px; }}
+    ChoiceBox QAbstractItemView {{ background: {t.raised}; border: 1px solid {t.line};
                 selection-background-color: {t.accent}; selection-color: {t.on_accent}; outline: none; }}
-    #patientBar QComboBox QAbstractItemView::item {{ padding: 4px 8px; }}
+    ChoiceBox QAbstractItemView::item {{ padding: 4px 8px; }}
     QCheckBox::indicator:unchecked {{
                 background: {t.raised}; border: 1px solid {t.muted}; border-radius: 2px;
                 width: 12px; height: 12px; }}
@@ -88,6 +88,10 @@ def style_sheet(theme: Theme) -> str:
                 color: {t.muted}; background: transparent; }}
     #drawer QToolButton:hover, #drawer QToolButton:focus {{ border-color: {t.accent}; }}
     #drawer QToolButton:checked {{ color: {t.text}; background: {t.line}; font-weight: 600; }}
+    #chart {{ border: 1px solid {t.line}; border-radius: 5px; }}
+    #chart:focus {{ border-color: {t.accent}; }}
+    #fold {{ border: 1px solid transparent; border-radius: 4px; font-weight: 600; padding: 2px; }}
+    #fold:focus {{ border-color: {t.accent}; }}
     #section {{ font-size: 11pt; font-weight: 600; }}
     #figure {{ font-weight: 600; }}
     #changed {{ background: {t.raised}; border: 1px solid {t.accent}; border-radius: 6px; }}
