@@ -72,6 +72,10 @@ VOLUME_RESOLUTION = 128
 FINEST = 1024
 """Of the resolutions: its lattice takes 4 GB."""
 
+UNEXPRESSED = 4.0
+"""Standard deviations from which on a scan is not met by chance. Of six synthetic airways at most 0.3 % of
+the surface lay beyond, and 1.6 to 4.4 % when a ring was widened by 2 mm, which no code can follow."""
+
 DIFFERENTIATED = 4096
 """Points at a time at which derivatives are taken."""
 
@@ -681,6 +685,18 @@ class Individual:
         points = np.asarray(points_mm)
         probed = points[:: max(1, len(points) // PROBED)]
         return TWO_SIDED_95 * blended(probed, self.surface_sd_mm(probed), points)
+
+    def unexpressed(self, points_mm: ArrayLike) -> NDArray[np.bool_]:
+        """Which points ``[n, 3]`` of the patient's surface the atlas cannot express, ``[n]``.
+
+        They lie farther from the fitted surface than :data:`UNEXPRESSED` standard deviations of its place
+        and of the noise of the fit together.
+        """
+        points = np.asarray(points_mm)
+        sd_mm = self.surface_margin_mm(points) / TWO_SIDED_95
+        noise_mm = self.posterior.noise * self.atlas.frame.scale_mm
+        away_mm = self.atlas.sdf(points, self.covariates, self.latent)
+        return np.asarray(np.abs(away_mm) > UNEXPRESSED * np.hypot(sd_mm, noise_mm))
 
     @cached_property
     def surface(self) -> trimesh.Trimesh:

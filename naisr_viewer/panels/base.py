@@ -43,6 +43,7 @@ class PanelKind:
         quantity: what they are, in a file; the name of the kind when left out.
         covariates: whose panels there are, one for each name; one of no covariate when left out.
         is_possible: whether an atlas can show it.
+        is_asked: whether there is something to show in a situation.
         is_mapped: whether its surface can be coloured by what covariates do to it.
         is_modelled: whether its surface is the shape model's, in which material points can be found.
     """
@@ -59,6 +60,7 @@ class PanelKind:
     quantity: str = ""
     covariates: Callable[[AtlasCard], tuple[str, ...]] = lambda _: ("",)
     is_possible: Callable[[AtlasCard], bool] = lambda _: True
+    is_asked: Callable[[ExplorerState], bool] = lambda _: True
     is_mapped: bool = False
     is_modelled: bool = True
 

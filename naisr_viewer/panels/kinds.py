@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from naisr_viewer.panels import before, change, deviation, effect, scan, shape, template, uncertainty
+from naisr_viewer.panels import before, change, deviation, effect, scan, scans, shape, template, uncertainty
 from naisr_viewer.panels.base import PanelKind
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState
@@ -25,6 +25,7 @@ KINDS: dict[str, PanelKind] = {
         uncertainty.KIND,
         deviation.KIND,
         change.KIND,
+        scans.KIND,
     )
 }
 """By name. A new kind is one line here and one among the answers of the engine; a script may add its own to
@@ -71,7 +72,8 @@ def with_layout_of(state: ExplorerState) -> ExplorerState:
 
 def visible_panels(state: ExplorerState) -> tuple[Panel, ...]:
     """The panels of the present layout; none without an atlas."""
-    return () if state.atlas is None else panels_in(state.layout, state.atlas)
+    found = () if state.atlas is None else panels_in(state.layout, state.atlas)
+    return tuple(panel for panel in found if kind_of(panel).is_asked(state))
 
 
 def request_for(state: ExplorerState, panel: Panel, resolution: int) -> SurfaceRequest:

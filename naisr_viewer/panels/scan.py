@@ -15,11 +15,20 @@ HINT = (
     "positive where the scan lies outside the shape. The residual is its mean without the sign, over points "
     "of the whole scan that the fit has not seen."
 )
+WORTH_TELLING = 0.01
+UNEXPRESSED = (
+    "So much of the scan lies farther from the fitted shape than its uncertainty allows: the atlas has no "
+    "such shape, whatever the code. Look at the places in strong colours: a finding, or a fault of the scan."
+)
 
 
 def _caption(state: ExplorerState, result: SurfaceResult) -> Caption:
     scan = state.shown.scan if state.shown else None
-    return Caption(large(size_of(scan) if scan else "…") + _away(state, result), HINT)
+    text = large(size_of(scan) if scan else "…") + _away(state, result)
+    share = result.unexpressed
+    if share is None or share < WORTH_TELLING:
+        return Caption(text, HINT)
+    return Caption(f"{text}<br>{100 * share:.0f}\u00a0% cannot be expressed", f"{HINT}\n{UNEXPRESSED}")
 
 
 def _away(state: ExplorerState, result: SurfaceResult) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -30,6 +30,7 @@ from naisr_viewer.views.main_window import MainWindow
 PIXELS = (1280, 800)
 SHOWN = {"age": 60.0, "weight": 19.0, "sex": -1.0}
 HARDLY_ANYONE: Named = (("age", 70.0), ("weight", 48.0))
+WIDENED_MM, RING_MM = 2.0, 4.0
 OTHER_SEED, AGE_MONTHS, LATER_MONTHS = 1000, 90.0, 36.0
 
 
@@ -60,7 +61,14 @@ def main(folder: Path) -> None:
             scene(window, controller)
             take_screenshot(window, controller, pictures / f"{name}.png")
         controller.begin(first)
-        _fit(window, controller, _child(Path(scans)))
+        child = _child(Path(scans))
+        _fit(window, controller, child)
+        _fit(window, controller, _widened(child))
+        window.patients.compared_chosen.emit(1)
+        controller.set_layout(Layout.CHANGE)
+        take_screenshot(window, controller, pictures / "scans.png")
+        controller.begin(first)
+        _fit(window, controller, child)
         controller.set_follow(True)
         controller.set_layout(Layout.CHANGE)
         controller.settle("age", dict(controller.state.named)["age"] + LATER_MONTHS)
@@ -104,6 +112,18 @@ def _child(folder: Path) -> Child:
     row = min(boys, key=lambda row: abs(float(row["age"]) - AGE_MONTHS))
     known = (("age", float(row["age"])), ("weight", float(row["weight"])), ("sex", 1.0))
     return Child(folder / row["mesh"], folder / row["landmarks"], known)
+
+
+def _widened(child: Child) -> Child:
+    """The same child with a ring about the middle of the airway widened by 2 mm."""
+    import trimesh
+
+    mesh = trimesh.load_mesh(child.mesh)
+    height = mesh.vertices[:, 2] - np.quantile(mesh.vertices[:, 2], 0.4)
+    mesh.vertices += WIDENED_MM * np.exp(-((height / RING_MM) ** 2))[:, None] * mesh.vertex_normals
+    file = child.mesh.with_name("widened.ply")
+    mesh.export(file)
+    return replace(child, mesh=file)
 
 
 def _plain(row: dict[str, str]) -> dict[str, str]:

@@ -87,6 +87,7 @@ class SurfaceResult:
             lay; None where there was no preview by tabulated displacements.
         volume_margin_cm3: half of the volume's 95 % interval; None for the population average.
         volume_before_cm3: of a change: the volume that it is counted from.
+        unexpressed: of a scan: share of it that the atlas cannot express; None where that is not asked.
         colouring: of a kind of view with numbers on its surface, at rest; else None.
     """
 
@@ -101,6 +102,7 @@ class SurfaceResult:
     preview_error_mm: float | None = None
     volume_margin_cm3: float | None = None
     volume_before_cm3: float | None = None
+    unexpressed: float | None = None
     colouring: Colouring | None = None
 
     @property

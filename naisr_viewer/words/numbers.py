@@ -87,11 +87,17 @@ def volume(cm3: float, margin_cm3: float | None = None) -> str:
 
 
 def gained(cm3: float, before_cm3: float, margin_cm3: float | None = None) -> str:
-    """A difference of volumes: ``+12.7 cm³ (+26 %)``; with no more digits than the later volume has."""
-    difference, digits = cm3 - before_cm3, 0 if before_cm3 >= 1000 else 1
+    """A difference of volumes: ``+12.7 cm³ (+26 %)``, ``+0.71 cm³ (+2.1 %)``.
+
+    It has no more digits than the margin of the later volume allows; a small one of two volumes that were
+    measured has two.
+    """
+    difference = cm3 - before_cm3
+    digits = 0 if before_cm3 >= 1000 else 2 if abs(difference) < 1 else 1
     if margin_cm3:
         digits = min(digits, 1 - math.floor(math.log10(margin_cm3)))
-    share = f" ({100 * difference / before_cm3:+.0f} %)" if before_cm3 else ""
+    percent = 100 * difference / before_cm3 if before_cm3 else 0.0
+    share = f" ({percent:+.{1 if abs(percent) < 9.5 else 0}f}\u00a0%)" if before_cm3 else ""
     return f"{round(difference, digits):+,.{max(0, digits)}f} cm³{share}".replace("-", "−")
 
 

@@ -31,6 +31,7 @@ def _give(source: Source, request: SurfaceRequest, _progress: Progress) -> Surfa
         seconds=time.perf_counter() - start,
         origin=Origin.MEASURED,
         colouring=colouring,
+        unexpressed=_unexpressed(fitted, request.values) if is_exact else None,
     )
 
 
@@ -39,6 +40,13 @@ def _distances(fitted: FittedPerson, values: Named) -> Colouring:
     atlas, latent = fitted.atlas_model, fitted.at(values).latent
     found = atlas.sdf(fitted.scan.points_mm, dict(values), latent)
     return Colouring(found.astype(np.float32), limit_mm(atlas, SHARE), "signed")
+
+
+def _unexpressed(fitted: FittedPerson, values: Named) -> float | None:
+    """Share of the scan that the atlas cannot express; only of the fit itself, not of another day."""
+    if values != tuple(fitted.fit.covariates.items()) or not len(fitted.scan.points_mm):
+        return None
+    return float(fitted.fit.individual.unexpressed(fitted.scan.points_mm).mean())
 
 
 ANSWER = Answer(_give)

@@ -19,8 +19,10 @@ def test_figures_have_digits_that_mean_something():
     assert volume(62410.3, 1234.0) == "62,400 ± 1,200 cm³"
     assert volume(48.31, 0.0) == volume(48.31) == "48.3 cm³"
     assert volume(62410.3) == "62,410 cm³"
-    assert gained(61.0, 48.3) == "+12.7 cm³ (+26 %)"
-    assert gained(48.3, 61.0) == "−12.7 cm³ (−21 %)"
+    assert gained(61.0, 48.3) == "+12.7 cm³ (+26\u00a0%)"
+    assert gained(48.3, 61.0) == "−12.7 cm³ (−21\u00a0%)"
+    assert gained(33.91, 33.2) == "+0.71 cm³ (+2.1\u00a0%)"
+    assert gained(33.46, 33.3, 0.51) == "+0.16 cm³ (+0.5\u00a0%)"
 
 
 def test_digits_suit_the_range():
