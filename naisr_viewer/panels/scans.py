@@ -24,10 +24,8 @@ def _is_asked(state: ExplorerState) -> bool:
 
 
 def _ask(state: ExplorerState, panel: Panel, resolution: int) -> SurfaceRequest:
-    reference, fit = state.reference, state.fit
-    assert reference is not None
-    assert fit is not None
-    return asked(state, panel, resolution, (), fit.person, (reference.person, ()))
+    before = None if state.reference is None else (state.reference.person, ())
+    return asked(state, panel, resolution, (), state.person, before)
 
 
 def _caption(_state: ExplorerState, result: SurfaceResult) -> Caption:

@@ -75,6 +75,11 @@ def test_without_another_scan_there_is_nothing_beside(both):
     assert SCANS not in visible_panels(replace(state, layout=Layout.FIT))
 
 
+def test_what_is_on_screen_can_be_asked_for_when_its_patient_is_left(both):
+    _, state = both
+    assert request_for(showing(state, None), SCANS, 0).person == 0
+
+
 def test_a_place_that_the_atlas_cannot_express_is_told(both):
     engine, state = both
     told = {}
