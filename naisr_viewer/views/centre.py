@@ -11,6 +11,7 @@ from naisr_viewer.views.drawer import Drawer
 from naisr_viewer.views.empty_page import EmptyPage
 from naisr_viewer.views.error_bar import ErrorBar
 from naisr_viewer.views.ledger import LedgerPage
+from naisr_viewer.views.matrix_bar import MatrixBar
 
 FULL_WIDTH_PX = 540
 """A narrower window takes from the panels as well as from the shapes."""
@@ -29,6 +30,7 @@ class Centre(QWidget):
         self.errors = ErrorBar(self)
         self.changed = ChangedBar(self)
         self.empty = EmptyPage(self)
+        self.matrix = MatrixBar(self)
         self.ledger = LedgerPage(self)
         self.drawer = Drawer({Tab.POINT: self.ledger}, self)
         self._shapes = shapes
@@ -39,6 +41,7 @@ class Centre(QWidget):
         column.addWidget(self.errors)
         column.addWidget(self.changed)
         column.addWidget(self.empty, 1)
+        column.addWidget(self.matrix)
         column.addWidget(shapes, 1)
         column.addWidget(self.drawer)
         self.show_shapes(False)
@@ -50,7 +53,7 @@ class Centre(QWidget):
     @property
     def stops(self) -> list[QWidget]:
         """What the Tab key goes through, as it is read."""
-        return [*self.errors.stops, *self.changed.stops, self.empty.button]
+        return [*self.errors.stops, *self.changed.stops, self.empty.button, *self.matrix.stops]
 
     @property
     def drawer_stops(self) -> list[QWidget]:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from naisr_viewer.panels.kinds import kind_of
+from naisr_viewer.panels.kinds import kind_of, request_for, visible_panels
+from naisr_viewer.panels.matrix import is_pale
 from naisr_viewer.state.atlas_card import AtlasCard
+from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Panel
+from naisr_viewer.state.matrix import plain_panel
 from naisr_viewer.state.requests import Scale
 from naisr_viewer.views.theme import Theme
 
@@ -35,6 +38,22 @@ def covariate_colour(atlas: AtlasCard, name: str) -> str:
 def panel_colour(atlas: AtlasCard, panel: Panel) -> str:
     """The colour of a panel's surface, where its vertices have none of their own."""
     return kind_of(panel).colour or covariate_colour(atlas, panel.covariate)
+
+
+def cell_colours(state: ExplorerState) -> dict[Panel, tuple[str, bool]]:
+    """The colour of each cell of the matrix on screen, that of what it shows, and whether it is pale."""
+    assert state.atlas is not None
+    result = {}
+    for panel in visible_panels(state):
+        shown = plain_panel(request_for(state, panel, 0).values)
+        result[panel] = panel_colour(state.atlas, shown), is_pale(state, panel)
+    return result
+
+
+def blend(colour: str, other: str, share: float) -> str:
+    """``colour`` (``#rrggbb``) with a share of another one."""
+    pairs = ((int(colour[i : i + 2], 16), int(other[i : i + 2], 16)) for i in (1, 3, 5))
+    return "#" + "".join(f"{round(own + share * (there - own)):02x}" for own, there in pairs)
 
 
 def pin_colour(number: int) -> str:

@@ -11,8 +11,10 @@ from PySide6.QtWidgets import QApplication, QHBoxLayout, QMainWindow, QWidget
 
 from naisr_model.shipped import shipped
 from naisr_viewer.panels.kinds import visible_panels
+from naisr_viewer.panels.matrix import here
 from naisr_viewer.state.drawer import Tab, tabs_of
 from naisr_viewer.state.explorer import ExplorerState
+from naisr_viewer.state.layouts import Layout
 from naisr_viewer.state.patients import Labels
 from naisr_viewer.state.pins import Ledger
 from naisr_viewer.state.questions import Answer, Question
@@ -29,7 +31,7 @@ from naisr_viewer.views.actions import (
     offer,
 )
 from naisr_viewer.views.centre import Centre
-from naisr_viewer.views.colours import pin_colour
+from naisr_viewer.views.colours import cell_colours, pin_colour
 from naisr_viewer.views.covariates.panel import CovariatePanel
 from naisr_viewer.views.dialogs.about import about
 from naisr_viewer.views.dialogs.documents import DocumentWindow
@@ -56,6 +58,7 @@ from naisr_viewer.views.shapes.shape_view import ShapeView
 from naisr_viewer.views.status_bar import StatusBar
 from naisr_viewer.views.style_sheet import style_sheet
 from naisr_viewer.views.theme import palette, resolved
+from naisr_viewer.words.matrix import heads
 
 TITLE = "NAISR Atlas Explorer"
 FIRST_SIZE = QSize(1280, 800)
@@ -81,6 +84,7 @@ class MainWindow(QMainWindow):
     undo_requested = Signal()  # Edit > Undo
     redo_requested = Signal()  # Edit > Redo
     layout_requested = Signal(object)  # a Layout from the View menu or the toolbar
+    matrix_requested = Signal(object)  # a Matrix from the boxes above its cells
     unpin_requested = Signal()  # Edit > Remove pins
     drawer_requested = Signal(object)  # a Tab of the drawer, or None to close it
     theme_requested = Signal(object)  # a ThemeChoice from the View menu
@@ -139,6 +143,7 @@ class MainWindow(QMainWindow):
         if len(state.patients) > len(old.patients):
             self._actions["patients"].setChecked(True)
         self.show_sides()
+        self._show_matrix(state)
         self.shapes.show_panels(visible_panels(state))
         self._show_ghost(state)
         self._actions[f"layout {state.layout}"].setChecked(True)
@@ -151,6 +156,18 @@ class MainWindow(QMainWindow):
         is_open = self._state.atlas is not None
         self.covariates.setVisible(is_open)
         self.patients.setVisible(is_open and self._actions["patients"].isChecked())
+
+    def _show_matrix(self, state: ExplorerState) -> None:
+        """What is told around the cells of the matrix, and nothing in other layouts."""
+        matrix = state.matrix if state.layout is Layout.MATRIX else None
+        self._centre.matrix.show_matrix(matrix, state.atlas)
+        if matrix is None or state.atlas is None:
+            self.shapes.show_heads(None)
+            self.shapes.outline(None)
+        else:
+            self.shapes.show_heads(heads(state.atlas, matrix))
+            self.shapes.show_colours(cell_colours(state))
+            self.shapes.outline(here(state))
 
     def _show_ghost(self, state: ExplorerState) -> None:
         scan = state.shown.scan if state.shown and state.has_ghost else None
@@ -358,6 +375,7 @@ class MainWindow(QMainWindow):
         self._centre.empty.open_requested.connect(self.ask_atlas)
         self._centre.changed.reopen_requested.connect(self._ask_again)
         self._centre.drawer.tab_requested.connect(self.drawer_requested)
+        self._centre.matrix.changed.connect(self.matrix_requested)
         self.patients.open_requested.connect(self.ask_scan)
         self.cancel.clicked.connect(self.cancel_requested)
         self.shapes.scale_changed.connect(self.scale.set_scale)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from naisr_viewer.engine.answers import change, deviation, effect, scan, shape, template, uncertainty
+from naisr_viewer.engine.answers import change, deviation, effect, matrix, scan, shape, template, uncertainty
 from naisr_viewer.engine.answers.base import Answer
 
 ANSWERS: dict[str, Answer] = {
@@ -14,5 +14,6 @@ ANSWERS: dict[str, Answer] = {
     "uncertainty": uncertainty.ANSWER,
     "deviation": deviation.ANSWER,
     "change": change.ANSWER,
+    "matrix": matrix.ANSWER,
 }
 """One line a kind, as among the panels."""

@@ -15,16 +15,23 @@ from naisr_viewer.state.layouts import Panel
 from naisr_viewer.state.requests import SurfaceResult
 from naisr_viewer.views.colours import panel_colour
 from naisr_viewer.views.elided import ElidedLabel
-from naisr_viewer.views.shapes.arrangement import CAPTION_PX, TITLE_PX
+from naisr_viewer.views.shapes.arrangement import CELL_STRIPS, Strips
 from naisr_viewer.views.shapes.colour_bar import HEIGHT_PX, WIDTH_PX, ColourBar
 
 MARGIN_PX = 10
 DOT_PX = 10
 
 
-def strip_height(panels: Sequence[Panel]) -> int:
-    """Pixels beneath every shape for colour bars; none where no panel has one."""
-    return HEIGHT_PX if any(kind_of(panel).scale for panel in panels) else 0
+def strips_of(panels: Sequence[Panel]) -> Strips:
+    """What stands around every shape; colour bars only where a panel has one."""
+    if any(panel.cell for panel in panels):
+        return CELL_STRIPS
+    return Strips(bar=HEIGHT_PX if any(kind_of(panel).scale for panel in panels) else 0)
+
+
+def columns_of(panels: Sequence[Panel]) -> int:
+    """How many sub-plots stand in a row, where they are cells of the matrix; 0 where they are not."""
+    return max((panel.cell[0] + 1 for panel in panels if panel.cell is not None), default=0)
 
 
 class Title(ElidedLabel):
@@ -79,15 +86,15 @@ class Cell:
         """All that stands around the shape."""
         return [self.title, self.caption, *([] if self.bar is None else [self.bar])]
 
-    def place(self, area: QRect, strip: int) -> None:
+    def place(self, area: QRect, strips: Strips) -> None:
         """The title above the shape; beneath it the colour bar, and the caption under that.
 
         Words that need more lines than usual begin higher up.
         """
-        self.title.setGeometry(area.left(), area.top(), area.width(), TITLE_PX)
-        self.caption.setContentsMargins(0, strip, 0, 0)
-        height = max(CAPTION_PX + strip, self.caption.heightForWidth(area.width()))
-        top = area.top() + max(area.height() - height, TITLE_PX)
+        self.title.setGeometry(area.left(), area.top(), area.width(), strips.title)
+        self.caption.setContentsMargins(0, strips.bar, 0, 0)
+        height = max(strips.caption + strips.bar, self.caption.heightForWidth(area.width()))
+        top = area.top() + max(area.height() - height, strips.title)
         self.caption.setGeometry(area.left(), top, area.width(), area.bottom() + 1 - top)
         if self.bar is not None:
             width = min(WIDTH_PX, area.width())

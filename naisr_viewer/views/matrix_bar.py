@@ -1,0 +1,112 @@
+"""By which two covariates the matrix is laid out: two boxes above the shapes, and how many values of each."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QSignalBlocker, Signal
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QSpinBox, QWidget
+
+from naisr_viewer.state.atlas_card import AtlasCard
+from naisr_viewer.state.matrix import (
+    LEAST_STEPS,
+    MOST_COLUMNS,
+    MOST_ROWS,
+    Axis,
+    Matrix,
+    Side,
+    with_count,
+    with_covariate,
+)
+from naisr_viewer.words.titles import label
+
+LEAST_LETTERS = 6
+"""Of a name that is always seen."""
+
+
+class SideBox(QWidget):
+    """One side: which covariate, and at how many values.
+
+    Args:
+        axis: which side.
+        title: what it is called; the letter after ``&`` brings the keyboard there.
+        most: values that there can be.
+        parent: the widget around it.
+    """
+
+    def __init__(self, axis: Axis, title: str, most: int, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.axis = axis
+        self.names = QComboBox(self)
+        self.names.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+        self.names.setMinimumContentsLength(LEAST_LETTERS)
+        self.count = QSpinBox(self)
+        self.count.setRange(LEAST_STEPS, most)
+        self.count.setAccessibleName(f"Values along the {title.replace('&', '').lower()}")
+        self.count.setToolTip("How many values of it; the first row and column are of one covariate alone")
+        name = QLabel(title, self)
+        name.setBuddy(self.names)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(6)
+        for widget in (name, self.names, self.count):
+            row.addWidget(widget)
+
+    def show_side(self, side: Side, atlas: AtlasCard) -> None:
+        """Show what the side is, telling nobody."""
+        names = [covariate.name for covariate in atlas.covariates]
+        with QSignalBlocker(self.names), QSignalBlocker(self.count):
+            if [self.names.itemData(index) for index in range(self.names.count())] != names:
+                self.names.clear()
+                for name in names:
+                    self.names.addItem(label(name), name)
+            self.names.setCurrentIndex(names.index(side.covariate))
+            self.count.setValue(len(side.values))
+        self.count.setEnabled(atlas.covariates[atlas.index(side.covariate)].kind == "continuous")
+
+
+class MatrixBar(QWidget):
+    """Both sides of the matrix.
+
+    Args:
+        parent: the widget around it.
+    """
+
+    changed = Signal(object)  # a Matrix that was chosen with the boxes
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setObjectName("matrixBar")
+        self.across = SideBox("across", "&Columns", MOST_COLUMNS, self)
+        self.down = SideBox("down", "&Rows", MOST_ROWS, self)
+        self._atlas: AtlasCard | None = None
+        self._matrix: Matrix | None = None
+        row = QHBoxLayout(self)
+        row.setContentsMargins(10, 4, 10, 4)
+        row.setSpacing(18)
+        for box in (self.across, self.down):
+            row.addWidget(box)
+            box.names.activated.connect(lambda _, box=box: self._choose(box))
+            box.count.valueChanged.connect(lambda count, box=box: self._count(box, count))
+        row.addStretch(1)
+        self.hide()
+
+    @property
+    def stops(self) -> list[QWidget]:
+        """What the Tab key goes through."""
+        return [self.across.names, self.across.count, self.down.names, self.down.count]
+
+    def show_matrix(self, matrix: Matrix | None, atlas: AtlasCard | None) -> None:
+        """Show what the matrix is laid out by; None hides all of it."""
+        self._matrix, self._atlas = matrix, atlas
+        if matrix is not None and atlas is not None:
+            self.across.show_side(matrix.across, atlas)
+            self.down.show_side(matrix.down, atlas)
+        self.setVisible(matrix is not None)
+
+    def _choose(self, box: SideBox) -> None:
+        if self._matrix is not None and self._atlas is not None:
+            name = box.names.currentData()
+            self.changed.emit(with_covariate(self._atlas, self._matrix, box.axis, name))
+
+    def _count(self, box: SideBox, count: int) -> None:
+        if self._matrix is not None and self._atlas is not None:
+            self.changed.emit(with_count(self._atlas, self._matrix, box.axis, count))
