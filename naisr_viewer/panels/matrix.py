@@ -30,9 +30,12 @@ def _ask(state: ExplorerState, panel: Panel, resolution: int) -> SurfaceRequest:
     return asked(state, panel, resolution, tuple(own.items()), state.person if own else 0)
 
 
+TEMPLATE = Caption("template", "The shape from which all others are made; both axes begin with it.")
+
+
 def _volume(result: SurfaceResult) -> Caption:
-    hint = enclosed(result).hint
-    return Caption(volume(result.volume_cm3, result.volume_margin_cm3), hint)
+    told = Caption(volume(result.volume_cm3, result.volume_margin_cm3), enclosed(result).hint)
+    return told if result.request.values else TEMPLATE.beneath(told)
 
 
 def here(state: ExplorerState) -> Panel | None:

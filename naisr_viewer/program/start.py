@@ -131,7 +131,7 @@ def make_window(
     AtlasWatch(controller)  # and this
     PinDesk(window, controller, engine, Worker(), Worker())  # and this
     SessionDesk(window, controller, engine, clinic, Worker(), Worker(), kept)  # and this
-    MatrixDesk(window, controller)  # and this
+    MatrixDesk(window, controller, engine)  # and this
     return window, controller
 
 

@@ -107,6 +107,22 @@ class SurfaceResult:
 
 
 @dataclass(frozen=True)
+class View:
+    """From where shapes are seen.
+
+    Attributes:
+        towards_eye: direction in the frame of the atlas, of any length.
+        up: what is upwards in the picture; in another direction.
+    """
+
+    towards_eye: tuple[float, float, float]
+    up: tuple[float, float, float]
+
+
+FROM_THE_FRONT = View((0.0, -1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+@dataclass(frozen=True)
 class ExportChoice:
     """What to write and where.
 
@@ -115,9 +131,14 @@ class ExportChoice:
         format: one of :data:`~naisr_model.exports.FORMATS`.
         resolution: cells along a side of the box.
         folder: made when it is missing.
+        figure: ``pdf`` or ``svg`` where the panels are the matrix, whose files have a folder of their own in
+            that folder; empty for surfaces alone.
+        view: from where a figure is seen.
     """
 
     panels: tuple[Panel, ...]
     format: str
     resolution: int
     folder: Path
+    figure: str = ""
+    view: View = FROM_THE_FRONT

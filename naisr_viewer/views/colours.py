@@ -17,6 +17,11 @@ COVARIATE_COLOURS = ("#e29a3b", "#4fae86", "#c0699f", "#46a9bd", "#d0694f", "#8f
 PIN_COLOURS = ("#d6246e", "#1f6fd6", "#4b2a8c")
 """Of the first, second and third pinned place; told from the shapes and from one another."""
 
+PALENESS = 0.6
+"""Share of the ground in the colour of a surface that is a guess."""
+
+PAPER = "#ffffff"
+
 SCALE_COLOURS: dict[Scale, tuple[str, ...]] = {
     "signed": (
         "#2957a8", "#4379c4", "#6b9bd3", "#9bb9d8", "#d1d5d8", "#d7b092", "#d3885a", "#c55f28", "#aa3600",
@@ -48,6 +53,14 @@ def cell_colours(state: ExplorerState) -> dict[Panel, tuple[str, bool]]:
         shown = plain_panel(request_for(state, panel, 0).values)
         result[panel] = panel_colour(state.atlas, shown), is_pale(state, panel)
     return result
+
+
+def printed_colours(state: ExplorerState) -> dict[Panel, str]:
+    """The same on white paper."""
+    return {
+        panel: blend(colour, PAPER, PALENESS if is_faint else 0.0)
+        for panel, (colour, is_faint) in cell_colours(state).items()
+    }
 
 
 def blend(colour: str, other: str, share: float) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from PySide6.QtCore import QSize, Qt, QTimer, Signal
@@ -76,10 +77,11 @@ class MainWindow(QMainWindow):
     reading_requested = Signal(
         object
     )  # a Reading: a patient's file and how to read it, from the command line
-    export_requested = Signal(object)  # an ExportChoice from the dialog
     session_requested = Signal(Path)  # a session was chosen or dropped
     session_place_chosen = Signal(Path)  # where the session shall go
     going_on_requested = Signal()  # File > Go on where you left
+    export_requested = Signal(object)  # an ExportChoice from the dialog, of surfaces
+    figure_requested = Signal(object)  # one of the matrix with its figure
     screenshot_requested = Signal(Path)  # where the picture shall go
     undo_requested = Signal()  # Edit > Undo
     redo_requested = Signal()  # Edit > Redo
@@ -288,7 +290,9 @@ class MainWindow(QMainWindow):
         """Let surfaces be chosen and written."""
         assert self._state.atlas is not None
         choice = ExportDialog(self._state, self).ask()
-        if choice is not None:
+        if choice is not None and choice.figure:
+            self.figure_requested.emit(replace(choice, view=self.shapes.view))
+        elif choice is not None:
             self.export_requested.emit(choice)
 
     def ask_session(self) -> None:

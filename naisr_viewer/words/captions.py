@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import NamedTuple
 
 import numpy as np
@@ -43,6 +44,11 @@ LATER = (
     "\nAway from the patient's own covariates another day is meant: what sets the patient apart is kept only "
     "as far as it is expected to last."
 )
+
+
+def lines_of(caption: Caption) -> tuple[str, ...]:
+    """What stands beneath a surface, as plain lines."""
+    return tuple(re.sub(r"<[^>]+>", "", line) for line in caption.text.split("<br>"))
 
 
 def large(text: str) -> str:

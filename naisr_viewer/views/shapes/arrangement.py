@@ -10,27 +10,26 @@ from PySide6.QtCore import QRect, QSize
 LEAST_WIDTH_PX = 150
 """Of a panel; captions are hardly wider."""
 
-ROOM = 1.25
-"""A shape is framed with this much room, so that it can grow while a slider moves."""
-
 Viewport = tuple[float, float, float, float]
 """Left, bottom, right and top as shares of the canvas, counted from its lower left corner."""
 
 
 class Strips(NamedTuple):
-    """Heights within a panel (px); words lie over whatever of a shape grows into theirs.
+    """How the height of a panel is shared (px); words lie over whatever of a shape grows into theirs.
 
     Attributes:
         title: above the shape.
         bar: beneath it, for a colour bar.
         caption: beneath that.
         least_shape: of a shape; rows that would leave less are scrolled to.
+        room: a shape is framed with so many times its size, so that it can grow while a slider moves.
     """
 
     title: int = 36
     bar: int = 0
     caption: int = 52
     least_shape: int = 80
+    room: float = 1.25
 
     @property
     def words(self) -> int:
@@ -38,8 +37,8 @@ class Strips(NamedTuple):
         return self.title + self.bar + self.caption
 
 
-CELL_STRIPS = Strips(title=0, caption=34, least_shape=56)
-"""Of a cell of the matrix, which is named at the ends of its column and row."""
+CELL_STRIPS = Strips(title=0, caption=34, least_shape=56, room=1.1)
+"""Of a cell of the matrix, which is named at the ends of its column and row and framed with larger ones."""
 
 
 class Rows(NamedTuple):
@@ -151,7 +150,7 @@ def eye_level(area: QRect, strips: Strips) -> float:
 def scale_to_fit(area: QRect, strips: Strips, wide_mm: float, high_mm: float) -> float:
     """Millimetres from the middle to the top of a panel between whose words a box so wide and high fits."""
     drawn_px = drawn_height(area, strips)
-    return ROOM * max(high_mm / drawn_px, wide_mm / area.width()) * area.height() / 2
+    return strips.room * max(high_mm / drawn_px, wide_mm / area.width()) * area.height() / 2
 
 
 def separators(areas: Sequence[QRect]) -> set[tuple[int, int, int, int]]:

@@ -13,10 +13,10 @@ from PySide6.QtWidgets import QWidget
 from pyvistaqt import QtInteractor
 
 from naisr_viewer.state.requests import SurfaceResult
-from naisr_viewer.views.colours import blend
+from naisr_viewer.views.colours import PALENESS, blend
 from naisr_viewer.views.shapes.arrangement import Viewport
 from naisr_viewer.views.shapes.camera import Direction, aim, is_any_seen, seen_size
-from naisr_viewer.views.shapes.looks import PALENESS, POINT_PX, as_ghost, as_marks
+from naisr_viewer.views.shapes.looks import POINT_PX, as_ghost, as_marks
 from naisr_viewer.views.shapes.sub_plot import SubPlot, picked, set_colouring, set_points
 
 REST_SAMPLES = 4

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from PySide6.QtCore import QRect, Qt
+from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtWidgets import QFrame, QWidget
 
 from naisr_viewer.state.atlas_card import AtlasCard
@@ -56,6 +56,10 @@ class Grid:
     def panel(self, index: int) -> Panel:
         """Whose sub-plot that is."""
         return list(self.cells)[index]
+
+    def panel_at(self, place: QPoint) -> Panel | None:
+        """Which sub-plot is on screen there, words included."""
+        return next((panel for panel, area in self._areas.items() if area.contains(place)), None)
 
     def say(self, panel: Panel, text: str, hint: str) -> None:
         """The line beneath a sub-plot, and more about it on hover."""

@@ -24,9 +24,6 @@ POINT_PX = 5
 GHOST_POINT_PX = 3
 """Diameter of the points of a cloud."""
 
-PALENESS = 0.6
-"""Share of the ground in the colour of a surface that is a guess."""
-
 MARK_PX = 11
 """Diameter of the dot at a marked place."""
 

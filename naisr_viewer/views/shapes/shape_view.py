@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QMargins, QSize, Qt, Signal
-from PySide6.QtGui import QResizeEvent
+from PySide6.QtCore import QMargins, QSize, Qt, Signal, SignalInstance
+from PySide6.QtGui import QMouseEvent, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
 
 from naisr_viewer.panels.kinds import all_panels
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.camera import Camera
 from naisr_viewer.state.layouts import FULL_SHAPE, Panel
-from naisr_viewer.state.requests import SurfaceResult
+from naisr_viewer.state.requests import SurfaceResult, View
 from naisr_viewer.views.colours import ghost_colour, panel_colour
 from naisr_viewer.views.shapes.arrangement import (
     Rows,
@@ -106,6 +106,14 @@ class ShapeView(QWidget):
     def is_ready(self) -> bool:
         """Whether surfaces are drawn as soon as they are shown."""
         return self._drawing.make_canvas is not None
+
+    @property
+    def view(self) -> View:
+        """From where the shapes are seen."""
+        if self._canvas is None:
+            return View(*self._direction)
+        camera = self._canvas.camera
+        return View(tuple(np.subtract(camera.position, camera.focal_point).tolist()), tuple(camera.up))
 
     def prepare(self) -> None:
         """Load what draws the shapes, beside the window where that takes time."""
@@ -244,6 +252,21 @@ class ShapeView(QWidget):
         """Rearrange for the new size."""
         super().resizeEvent(event)
         self._arrange()
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        """A click on words around a shape chooses its sub-plot; words pass it on to here."""
+        super().mouseReleaseEvent(event)
+        self._tell(self.chosen, event)
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        """The same of a double click."""
+        super().mouseDoubleClickEvent(event)
+        self._tell(self.opened, event)
+
+    def _tell(self, signal: SignalInstance, event: QMouseEvent) -> None:
+        panel = self._grid.panel_at(event.position().toPoint())
+        if panel is not None and event.button() is Qt.MouseButton.LeftButton:
+            signal.emit(panel)
 
     def _open_canvas(self) -> None:
         """Start drawing anew, with all that was shown before."""
