@@ -61,7 +61,8 @@ def write_surface(
 
 def write_mesh(path: Path, result: SurfaceResult) -> None:
     """Write a surface alone; otherwise as :func:`write_surface`."""
-    content = mesh_bytes(_triangles(result), require_writable(path, result))
+    ending = require_writable(path, result)
+    content = mesh_bytes(_triangles(result), ending)
     with replacing(path) as temporary:
         temporary.write_bytes(content)
 
