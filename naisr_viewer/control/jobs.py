@@ -13,9 +13,9 @@ from naisr_viewer.engine.engine import Engine
 from naisr_viewer.engine.ledgers import ledger, origin_mm
 from naisr_viewer.engine.sessions import Restored, completed, restored
 from naisr_viewer.files.exports import Planned
-from naisr_viewer.files.sessions import read_session, write_session
 from naisr_viewer.files.figure import figure_bytes
 from naisr_viewer.files.matrix import MatrixPlan, figure_of, write_matrix
+from naisr_viewer.files.sessions import read_session, write_session
 from naisr_viewer.files.surfaces import require_writable, write_surface
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState

@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from naisr_model.progress import SILENT, Progress
+from naisr_viewer.state.camera import Camera
 from naisr_viewer.state.layouts import Cell
-from naisr_viewer.state.requests import SurfaceResult, View
+from naisr_viewer.state.requests import SurfaceResult
 from naisr_viewer.words.matrix import Heads
 
 if TYPE_CHECKING:
@@ -80,7 +81,7 @@ class MatrixFigure:
         heads: at their ends.
         plates: the cells.
         note: beneath all of it.
-        view: from where the shapes are seen.
+        camera: from where the shapes are seen; how near it is does not matter.
     """
 
     across: str
@@ -88,7 +89,7 @@ class MatrixFigure:
     heads: Heads
     plates: Mapping[Cell, Plate]
     note: str
-    view: View
+    camera: Camera
 
 
 def figure_bytes(figure: MatrixFigure, ending: str, progress: Progress = SILENT) -> bytes:
@@ -101,32 +102,35 @@ def figure_bytes(figure: MatrixFigure, ending: str, progress: Progress = SILENT)
 
     box, content = _common_box(figure), io.BytesIO()
     pieces = progress.over(list(figure.plates.items()))
-    images = {cell: shape_image(plate.surface, plate.colour, figure.view, box) for (cell, plate), _ in pieces}
+    images = {
+        cell: shape_image(plate.surface, plate.colour, figure.camera, box) for (cell, plate), _ in pieces
+    }
     dateless = {"Date": None} if ending == "svg" else {"CreationDate": None}
     with rc_context(STYLE):
         _drawn(figure, images, box).savefig(content, format=ending, metadata=dateless)
     return content.getvalue()
 
 
-def as_seen(vectors: NDArray[np.floating], view: View) -> NDArray[np.float64]:
+def as_seen(vectors: NDArray[np.floating], camera: Camera) -> NDArray[np.float64]:
     """Vectors ``[n, 3]`` to the right, upwards and towards the eye, without perspective."""
-    back = np.array(view.towards_eye) / np.linalg.norm(view.towards_eye)
-    right = np.cross(view.up, back)
+    back = np.subtract(camera.position_mm, camera.focus_mm)
+    back /= np.linalg.norm(back)
+    right = np.cross(camera.up, back)
     right /= np.linalg.norm(right)
     seen: NDArray[np.float64] = vectors @ np.stack([right, np.cross(back, right), back], axis=1)
     return seen
 
 
-def shape_image(surface: SurfaceResult, colour: str, view: View, box: Box) -> NDArray[np.uint8]:
+def shape_image(surface: SurfaceResult, colour: str, camera: Camera, box: Box) -> NDArray[np.uint8]:
     """A lit surface on nothing: red, green, blue and opacity, ``[dots, dots, 4]``.
 
     Triangles that face the eye are drawn from the farthest to the nearest.
     """
-    triangles = as_seen(surface.points_mm, view)[surface.faces]
+    triangles = as_seen(surface.points_mm, camera)[surface.faces]
     edges = np.diff(triangles, axis=1)
     facing = np.flatnonzero(np.cross(edges[:, 0], edges[:, 1])[:, 2] > 0)
     order = facing[np.argsort(triangles[facing, :, 2].mean(axis=1))]
-    light = as_seen(surface.normals, view)[surface.faces[order]][..., 2].mean(axis=1).clip(0, 1)
+    light = as_seen(surface.normals, camera)[surface.faces[order]][..., 2].mean(axis=1).clip(0, 1)
     own = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
     colours = (own * (AMBIENT + DIFFUSE * light)[:, None]).clip(0, 1)
     return _averaged(_painted(triangles[order, :, :2], colours, box))
@@ -159,7 +163,7 @@ def _averaged(dots: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 def _common_box(figure: MatrixFigure) -> Box:
     """A square around all shapes as they are seen, so that they can be compared."""
-    seen = [as_seen(plate.surface.points_mm, figure.view)[:, :2] for plate in figure.plates.values()]
+    seen = [as_seen(plate.surface.points_mm, figure.camera)[:, :2] for plate in figure.plates.values()]
     points = np.concatenate(seen)
     low, high = points.min(axis=0), points.max(axis=0)
     (x, y), half = (low + high) / 2, ROOM * float((high - low).max()) / 2

@@ -66,7 +66,7 @@ def figure_of(
         if (panel := surface.request.panel).cell is not None
     }
     across, down = label(state.matrix.across.covariate), label(state.matrix.down.covariate)
-    return MatrixFigure(across, down, heads(state.atlas, state.matrix), plates, note(state), choice.view)
+    return MatrixFigure(across, down, heads(state.atlas, state.matrix), plates, note(state), choice.camera)
 
 
 def write_matrix(

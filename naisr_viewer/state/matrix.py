@@ -57,6 +57,14 @@ def first_matrix(atlas: AtlasCard) -> Matrix | None:
     return Matrix(side_of(atlas, names[0], FIRST_COLUMNS), side_of(atlas, names[1], FIRST_ROWS))
 
 
+def kept_matrix(atlas: AtlasCard, kept: Matrix | None) -> Matrix | None:
+    """A matrix that was kept, where the atlas has what it is laid out by; otherwise its first one."""
+    if kept is None or kept.across.covariate == kept.down.covariate:
+        return first_matrix(atlas)
+    fits = _fits(atlas, kept.across, MOST_COLUMNS) and _fits(atlas, kept.down, MOST_ROWS)
+    return kept if fits else first_matrix(atlas)
+
+
 def side_of(atlas: AtlasCard, name: str, count: int) -> Side:
     """A covariate at equal distances, as far as 90 % of the people go; a binary one at its two levels.
 
@@ -134,6 +142,11 @@ def plain_panel(values: Named) -> Panel:
 
 def _with(matrix: Matrix, axis: Axis, side: Side) -> Matrix:
     return replace(matrix, across=side) if axis == "across" else replace(matrix, down=side)
+
+
+def _fits(atlas: AtlasCard, side: Side, most: int) -> bool:
+    found = [each for each in atlas.covariates if each.name == side.covariate]
+    return 0 < len(side.values) <= most and any(all(map(each.contains, side.values)) for each in found)
 
 
 def _most(atlas: AtlasCard, covariate: Covariate) -> tuple[float, float]:

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from naisr_viewer.state.camera import FROM_THE_FRONT, Camera
 from naisr_viewer.state.layouts import Panel
 from naisr_viewer.state.patients import Named
 
@@ -107,22 +108,6 @@ class SurfaceResult:
 
 
 @dataclass(frozen=True)
-class View:
-    """From where shapes are seen.
-
-    Attributes:
-        towards_eye: direction in the frame of the atlas, of any length.
-        up: what is upwards in the picture; in another direction.
-    """
-
-    towards_eye: tuple[float, float, float]
-    up: tuple[float, float, float]
-
-
-FROM_THE_FRONT = View((0.0, -1.0, 0.0), (0.0, 0.0, 1.0))
-
-
-@dataclass(frozen=True)
 class ExportChoice:
     """What to write and where.
 
@@ -133,7 +118,7 @@ class ExportChoice:
         folder: made when it is missing.
         figure: ``pdf`` or ``svg`` where the panels are the matrix, whose files have a folder of their own in
             that folder; empty for surfaces alone.
-        view: from where a figure is seen.
+        camera: from where a figure is seen.
     """
 
     panels: tuple[Panel, ...]
@@ -141,4 +126,4 @@ class ExportChoice:
     resolution: int
     folder: Path
     figure: str = ""
-    view: View = FROM_THE_FRONT
+    camera: Camera = FROM_THE_FRONT

@@ -291,7 +291,7 @@ class MainWindow(QMainWindow):
         assert self._state.atlas is not None
         choice = ExportDialog(self._state, self).ask()
         if choice is not None and choice.figure:
-            self.figure_requested.emit(replace(choice, view=self.shapes.view))
+            self.figure_requested.emit(replace(choice, camera=self.shapes.camera or choice.camera))
         elif choice is not None:
             self.export_requested.emit(choice)
 

@@ -15,7 +15,7 @@ from naisr_viewer.panels.kinds import all_panels
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.camera import Camera
 from naisr_viewer.state.layouts import FULL_SHAPE, Panel
-from naisr_viewer.state.requests import SurfaceResult, View
+from naisr_viewer.state.requests import SurfaceResult
 from naisr_viewer.views.colours import ghost_colour, panel_colour
 from naisr_viewer.views.shapes.arrangement import (
     Rows,
@@ -106,14 +106,6 @@ class ShapeView(QWidget):
     def is_ready(self) -> bool:
         """Whether surfaces are drawn as soon as they are shown."""
         return self._drawing.make_canvas is not None
-
-    @property
-    def view(self) -> View:
-        """From where the shapes are seen."""
-        if self._canvas is None:
-            return View(*self._direction)
-        camera = self._canvas.camera
-        return View(tuple(np.subtract(camera.position, camera.focal_point).tolist()), tuple(camera.up))
 
     def prepare(self) -> None:
         """Load what draws the shapes, beside the window where that takes time."""

@@ -42,6 +42,7 @@ def test_the_matrix_is_proposed_whole_with_a_figure_that_single_views_do_not_hav
     qtbot.addWidget(dialog)
     dialog.show()
     assert dialog.choice().panels == visible_panels(state)
+    assert dialog.figure is not None
     dialog.figure.setCurrentText("SVG")
     assert dialog.choice().figure == "svg"
     dialog.what.setCurrentIndex(1)
