@@ -145,8 +145,7 @@ class MainWindow(QMainWindow):
         if len(state.patients) > len(old.patients):
             self._actions["patients"].setChecked(True)
         self.show_sides()
-        self._show_matrix(state)
-        self.shapes.show_panels(visible_panels(state))
+        self._show_panels(state)
         self._show_ghost(state)
         self._actions[f"layout {state.layout}"].setChecked(True)
         for tab in Tab:
@@ -159,15 +158,15 @@ class MainWindow(QMainWindow):
         self.covariates.setVisible(is_open)
         self.patients.setVisible(is_open and self._actions["patients"].isChecked())
 
-    def _show_matrix(self, state: ExplorerState) -> None:
-        """What is told around the cells of the matrix, and nothing in other layouts."""
+    def _show_panels(self, state: ExplorerState) -> None:
+        """The sub-plots of the layout, and what stands around the cells of the matrix."""
         matrix = state.matrix if state.layout is Layout.MATRIX else None
         self._centre.matrix.show_matrix(matrix, state.atlas)
         if matrix is None or state.atlas is None:
-            self.shapes.show_heads(None)
+            self.shapes.show_panels(visible_panels(state))
             self.shapes.outline(None)
         else:
-            self.shapes.show_heads(heads(state.atlas, matrix))
+            self.shapes.show_panels(visible_panels(state), heads(state.atlas, matrix))
             self.shapes.show_colours(cell_colours(state))
             self.shapes.outline(here(state))
 

@@ -121,8 +121,14 @@ class ShapeView(QWidget):
         self._theme = theme
         self._open_canvas()
 
-    def show_panels(self, panels: Sequence[Panel]) -> None:
-        """Put these sub-plots on screen and hide the others."""
+    def show_panels(self, panels: Sequence[Panel], heads: Heads | None = None) -> None:
+        """Put these sub-plots on screen and hide the others.
+
+        Args:
+            panels: which.
+            heads: names of their columns and rows; None where they have their own titles.
+        """
+        before, self._heads = self._heads, heads
         if tuple(panels) != self._visible:
             self._framed = self._framed and columns_of(panels) == columns_of(self._visible)
             self._visible = tuple(panels)
@@ -130,11 +136,7 @@ class ShapeView(QWidget):
             self._arrange()
             self._looked_after = False
             self._look_after()
-
-    def show_heads(self, heads: Heads | None) -> None:
-        """Name columns and rows; None where the sub-plots have their own titles."""
-        if heads != self._heads:
-            self._heads = heads
+        elif heads != before:
             self._arrange()
 
     def show_colours(self, colours: Colours) -> None:
