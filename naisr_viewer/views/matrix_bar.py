@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QSignalBlocker, Signal
-from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QSpinBox, QWidget
+from PySide6.QtCore import QSignalBlocker, QSize, Signal
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QBoxLayout, QComboBox, QHBoxLayout, QLabel, QSizePolicy, QSpinBox, QWidget
 
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.matrix import (
@@ -18,8 +19,11 @@ from naisr_viewer.state.matrix import (
 )
 from naisr_viewer.words.titles import label
 
-LEAST_LETTERS = 6
-"""Of a name that is always seen."""
+NAME_PX, LEAST_NAME_PX = 110, 40
+"""Width of a name, and what is left of it in a small window."""
+
+
+GAP_PX = 6
 
 
 class SideBox(QWidget):
@@ -36,19 +40,22 @@ class SideBox(QWidget):
         super().__init__(parent)
         self.axis = axis
         self.names = QComboBox(self)
-        self.names.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
-        self.names.setMinimumContentsLength(LEAST_LETTERS)
+        self.names.setMinimumWidth(LEAST_NAME_PX)
+        self.names.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.count = QSpinBox(self)
         self.count.setRange(LEAST_STEPS, most)
         self.count.setAccessibleName(f"Values along the {title.replace('&', '').lower()}")
         self.count.setToolTip("How many values of it; the first row and column are of one covariate alone")
-        name = QLabel(title, self)
-        name.setBuddy(self.names)
+        self.title = QLabel(title, self)
+        self.title.setBuddy(self.names)
+        beside = self.title.sizeHint().width() + self.count.sizeHint().width() + 2 * GAP_PX
+        self.setMaximumWidth(beside + NAME_PX)
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(6)
-        for widget in (name, self.names, self.count):
-            row.addWidget(widget)
+        row.setSpacing(GAP_PX)
+        row.addWidget(self.title)
+        row.addWidget(self.names, 1)
+        row.addWidget(self.count)
 
     def show_side(self, side: Side, atlas: AtlasCard) -> None:
         """Show what the side is, telling nobody."""
@@ -79,20 +86,33 @@ class MatrixBar(QWidget):
         self.down = SideBox("down", "&Rows", MOST_ROWS, self)
         self._atlas: AtlasCard | None = None
         self._matrix: Matrix | None = None
-        row = QHBoxLayout(self)
-        row.setContentsMargins(10, 4, 10, 4)
-        row.setSpacing(18)
+        self._row = QHBoxLayout(self)
+        self._row.setContentsMargins(10, 4, 10, 4)
+        self._row.setSpacing(3 * GAP_PX)
         for box in (self.across, self.down):
-            row.addWidget(box)
+            self._row.addWidget(box, 1)
             box.names.activated.connect(lambda _, box=box: self._choose(box))
             box.count.valueChanged.connect(lambda count, box=box: self._count(box, count))
-        row.addStretch(1)
+        self._row.addStretch(0)
         self.hide()
 
     @property
     def stops(self) -> list[QWidget]:
         """What the Tab key goes through."""
         return [self.across.names, self.across.count, self.down.names, self.down.count]
+
+    def minimumSizeHint(self) -> QSize:
+        """The window is not kept wide for it."""
+        return QSize(0, super().minimumSizeHint().height())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Where there is little room, one side under the other, and then without their titles."""
+        super().resizeEvent(event)
+        is_wide = self.width() >= 2 * self.across.sizeHint().width()
+        direction = QBoxLayout.Direction.LeftToRight if is_wide else QBoxLayout.Direction.TopToBottom
+        self._row.setDirection(direction)
+        for box in (self.across, self.down):
+            box.title.setVisible(self.width() >= self.across.maximumWidth())
 
     def show_matrix(self, matrix: Matrix | None, atlas: AtlasCard | None) -> None:
         """Show what the matrix is laid out by; None hides all of it."""

@@ -56,6 +56,11 @@ def large(text: str) -> str:
     return f'<span style="font-size:12pt">{text}</span>'
 
 
+def small(text: str) -> str:
+    """Words that have little room."""
+    return f'<span style="font-size:8pt">{text}</span>' if text else ""
+
+
 def beyond(colouring: Colouring) -> str:
     """A colour at the end of its scale says less than it seems to; empty where hardly any is."""
     share = float((np.abs(colouring.values) > colouring.limit).mean())

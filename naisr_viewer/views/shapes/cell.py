@@ -17,9 +17,13 @@ from naisr_viewer.views.colours import panel_colour
 from naisr_viewer.views.elided import ElidedLabel
 from naisr_viewer.views.shapes.arrangement import CELL_STRIPS, Strips
 from naisr_viewer.views.shapes.colour_bar import HEIGHT_PX, WIDTH_PX, ColourBar
+from naisr_viewer.words.captions import small
 
 MARGIN_PX = 10
 DOT_PX = 10
+
+ROOMY_PX = 116
+"""A caption that is narrower has small letters; four words in usual ones are hardly wider."""
 
 
 def strips_of(panels: Sequence[Panel]) -> Strips:
@@ -68,12 +72,14 @@ class Cell:
         title: what stands above.
         caption: the label beneath.
         bar: what its colours stand for; None where it has none.
+        words: what the caption says.
         result: the surface, or None as long as there is none.
     """
 
     title: Title
     caption: QLabel
     bar: ColourBar | None
+    words: str = ""
     result: SurfaceResult | None = None
 
     @property
@@ -93,6 +99,7 @@ class Cell:
         """
         self.title.setGeometry(area.left(), area.top(), area.width(), strips.title)
         self.caption.setContentsMargins(0, strips.bar, 0, 0)
+        self.caption.setText(self.words if area.width() >= ROOMY_PX else small(self.words))
         height = max(strips.caption + strips.bar, self.caption.heightForWidth(area.width()))
         top = area.top() + max(area.height() - height, strips.title)
         self.caption.setGeometry(area.left(), top, area.width(), area.bottom() + 1 - top)

@@ -64,6 +64,7 @@ class Grid:
     def say(self, panel: Panel, text: str, hint: str) -> None:
         """The line beneath a sub-plot, and more about it on hover."""
         cell = self.cells[panel]
+        cell.words = text
         cell.caption.setText(text)
         cell.caption.setToolTip(hint)
         if panel in self._areas:
