@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -32,6 +32,7 @@ from naisr_model.covariates import (
     complete,
     interval_in_words,
     normalised_vector,
+    require_known,
 )
 from naisr_model.errors import InputError
 from naisr_model.frames import Frame
@@ -61,6 +62,7 @@ from naisr_model.surface.displacements import Displacements, DisplacementTables,
 from naisr_model.surface.fields import distances, effect_field, shape_field, template_field
 from naisr_model.surface.isosurface import isosurface
 from naisr_model.surface.lattice import Lattice
+from naisr_model.surface.maps import outward, rates, travelled
 from naisr_model.surface.material import origins, parts, places
 from naisr_model.surface.sparse import CHUNK, COARSEST, Field, evaluate_band
 from naisr_model.surface.tracking import CodeTracker, FadingTracker, Tracker, make_tracker
@@ -69,6 +71,9 @@ from naisr_model.surface.volume import enclosed_volume
 VOLUME_RESOLUTION = 128
 FINEST = 1024
 """Of the resolutions: its lattice takes 4 GB."""
+
+DIFFERENTIATED = 4096
+"""Points at a time at which derivatives are taken."""
 
 TOGETHER = 4
 """Shapes that points are carried to at once: their activations stay in the processor's cache."""
@@ -393,6 +398,62 @@ class Atlas:
             person_mm=found.person.numpy(force=True) * self.frame.scale_mm,
         )
 
+    def moved_mm(
+        self, points_mm: ArrayLike, covariates: Values, latent: ArrayLike | None = None
+    ) -> NDArray[np.float32]:
+        """How far a shape's points ``[n, 3]`` have come from the template along its outward normals, ``[n]``.
+
+        Raises:
+            InputError: for an unknown covariate or one out of range, and where the model deforms no template.
+        """
+        model, vector, code = deformable(self._model), self._vector(covariates, False), self._latent(latent)
+        found = self._in_pieces(points_mm, lambda points: travelled(model, points, vector, code))
+        return found * np.float32(self.frame.scale_mm)
+
+    def rates_mm(
+        self, points_mm: ArrayLike, name: str, covariates: Values, latent: ArrayLike | None = None
+    ) -> NDArray[np.float32]:
+        """How fast a shape's surface moves outwards with one covariate at points ``[n, 3]``, ``[n]``.
+
+        Returns:
+            Millimetres per unit of the covariate, by automatic differentiation.
+
+        Raises:
+            InputError: for an unknown covariate or one out of range.
+        """
+        vector, code = self._vector(covariates, False), self._latent(latent)
+        require_known([name], self.covariates)
+        index = self.population.names.index(name)
+        found = self._in_pieces(points_mm, lambda points: rates(self._model, points, vector, code, index))
+        return found * np.float32(self.frame.scale_mm / self.covariates[index].scale)
+
+    def contrast_mm(
+        self, points_mm: ArrayLike, name: str, covariates: Values, latent: ArrayLike | None = None
+    ) -> NDArray[np.float32]:
+        """How much farther out a shape's points ``[n, 3]`` are at the second level of a covariate, ``[n]``.
+
+        Their material points are found at both levels (or both ends of its range), everything else equal, and
+        compared along the normals of the shape.
+
+        Raises:
+            InputError: for an unknown covariate or one out of range, where the deformation folds, and where
+                the model deforms no template.
+        """
+        require_known([name], self.covariates)
+        ends = self.covariates[self.population.names.index(name)].range
+        origins_mm = self.origins_mm(points_mm, covariates, latent)
+        codes = None if latent is None else [latent, latent]
+        low, high = self.carried_mm(origins_mm, [{**covariates, name: end} for end in ends], codes)
+        model, vector, code = self._model, self._vector(covariates, False), self._latent(latent)
+        normals = self._in_pieces(points_mm, lambda points: outward(model, points, vector, code))
+        return np.sum((high - low) * normals, axis=1).astype(np.float32)
+
+    def _in_pieces(self, points_mm: ArrayLike, values_at: Callable[[Tensor], Tensor]) -> NDArray[np.float32]:
+        """Values at points ``[n, 3]``, some at a time: derivatives hold all that led to them."""
+        points = self._model.tensor(self.frame.to_model(points_mm))
+        found = [values_at(piece).numpy(force=True) for piece in points.split(DIFFERENTIATED)]
+        return np.concatenate(found)
+
     def carried_mm(
         self,
         origins_mm: ArrayLike,
@@ -686,6 +747,24 @@ class Fit:
         """
         columns = enumerate(self.individual.atlas.covariates)
         return {one.name: self._interval(column, one) for column, one in columns if one.name in self.inferred}
+
+    @property
+    def covariances(self) -> dict[tuple[str, str], float]:
+        """Of the inferred continuous covariates, about the values told, in the product of their units.
+
+        All explanations together: ``sum_k p_k (S_k + (m_k - m)(m_k - m)^T)`` with the probability p_k of
+        each, its covariance S_k and its values m_k.
+        """
+        told, free = self.results[0].covariates, self.results[0].free
+        offsets = np.array([result.covariates - told for result in self.results])[:, free]
+        within = np.einsum("k,kij->ij", self._shares, np.array([result.spread for result in self.results]))
+        across = within + (offsets.T * self._shares) @ offsets
+        chosen = [self.individual.atlas.covariates[column] for column in free]
+        return {
+            (one.name, other.name): float(across[i, j] * one.scale * other.scale)
+            for i, one in enumerate(chosen)
+            for j, other in enumerate(chosen)
+        }
 
     @property
     def lasting(self) -> float:

@@ -42,6 +42,9 @@ EDGE_OF_DATA = 0.98
 NEIGHBOURS = 3
 """How many shapes must be near a combination for it to be among the data."""
 
+AT_ONCE = 256
+"""Places that are compared with all rows at a time: their distances stay in the processor's cache."""
+
 LEAST_SPREAD = 0.05
 """Combinations closer than this (standard deviations) to a shape are always among the data."""
 
@@ -224,28 +227,78 @@ class Population:
         return all(c.contains(values.get(c.name, c.centre)) for c in self.covariates)
 
     def has_data_at(self, values: Values) -> bool:
-        """Whether people like ``values`` are among those behind the atlas.
-
-        Compares the distance to the :data:`NEIGHBOURS`-th nearest training row, over the continuous
-        covariates in units of their spread, with the same distance of the rows among themselves.
+        """Whether people like ``values`` are among those behind the atlas: :meth:`remoteness` is at most 1.
 
         Args:
             values: real values by name; a missing covariate is at its mean.
         """
-        measured = [covariate for covariate in self.covariates if covariate.kind == "continuous"]
-        if not measured or np.count_nonzero(~self.held_out) <= NEIGHBOURS:
-            return True
+        here = [values.get(c.name, c.centre) for c in self.covariates]
+        return bool(self.remoteness(np.array([here]))[0] <= 1)
+
+    def remoteness(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How far combinations of covariates are from the people behind the atlas; the data end at 1.
+
+        That is the distance to the :data:`NEIGHBOURS`-th nearest training row, over the continuous
+        covariates in units of their spread, divided by the same distance of the rows among themselves that
+        a share of :data:`EDGE_OF_DATA` of them keeps to.
+
+        Args:
+            places: real values, ``[m, N]``.
+
+        Returns:
+            ``[m]``; 0 everywhere where there are no continuous covariates, or too few rows to tell.
+        """
+        if not self._tells_data:
+            return np.zeros(len(places))
         rows, usual = self._neighbourhood
+        measured = zip(self._measured, places[:, self._measured].T, strict=True)
+        here = np.stack([self.covariates[i].normalise(column) for i, column in measured], axis=1)
+        return _loneliness(rows, here, NEIGHBOURS) / usual
+
+    def stretches_with_data(self, name: str, values: Values) -> tuple[tuple[float, float], ...]:
+        """Where along one covariate :meth:`has_data_at` holds, the others staying as they are.
+
+        The NEIGHBOURS-th nearest row is near enough exactly where so many rows are, and each row is so along
+        one interval about it: ``|t - t_j| <= sqrt(usual^2 - r_j^2)``, r_j being its distance in the others.
+
+        Args:
+            name: of the covariate that moves.
+            values: real values by name; a missing covariate is at its mean.
+
+        Returns:
+            Low and high ends in real units, inside the observed range, in order.
+        """
+        covariate = self.covariates[self.names.index(name)]
+        if covariate.kind == "binary" or not self._tells_data:
+            return (covariate.range,) if self.has_data_at(values) else ()
+        rows, usual = self._neighbourhood
+        moving = [self.names[i] for i in self._measured].index(name)
+        measured = [self.covariates[i] for i in self._measured]
         here = np.array([float(c.normalise(values.get(c.name, c.centre))) for c in measured])
-        return _loneliness(rows, here, NEIGHBOURS) <= usual
+        across = np.delete(np.square(rows - here), moving, axis=1).sum(axis=1)
+        near = across <= usual**2
+        reach = np.sqrt(usual**2 - across[near])
+        ends = _covered(rows[near, moving] - reach, rows[near, moving] + reach, NEIGHBOURS)
+        low, high = covariate.range
+        real = covariate.restore(ends)
+        return tuple((max(a, low), min(b, high)) for a, b in real.tolist() if b > low and a < high)
+
+    @cached_property
+    def _measured(self) -> list[int]:
+        """Columns of the continuous covariates."""
+        return [i for i, covariate in enumerate(self.covariates) if covariate.kind == "continuous"]
+
+    @cached_property
+    def _tells_data(self) -> bool:
+        """Whether there is enough to tell where data are."""
+        return bool(self._measured) and int(np.sum(~self.held_out)) > NEIGHBOURS
 
     @cached_property
     def _neighbourhood(self) -> tuple[NDArray[np.float64], float]:
         """The training rows, and how far their neighbours are at the edge of the data."""
-        columns = [i for i, covariate in enumerate(self.covariates) if covariate.kind == "continuous"]
-        rows = self.normalised()[~self.held_out][:, columns]
+        rows = self.normalised()[~self.held_out][:, self._measured]
         # One more: every row is its own nearest. By hand, because SciPy would delay the first picture.
-        distances = [_loneliness(rows, row, NEIGHBOURS + 1) for row in rows]
+        distances = _loneliness(rows, rows, NEIGHBOURS + 1)
         return rows, max(float(np.quantile(distances, EDGE_OF_DATA)), LEAST_SPREAD)
 
     def to_json(self) -> dict[str, Any]:
@@ -477,7 +530,26 @@ def _local_mean(given: NDArray[np.float64], rows: NDArray[np.float64], place: fl
     return np.asarray(solution[0])
 
 
-def _loneliness(rows: NDArray[np.float64], here: NDArray[np.float64], neighbours: int) -> float:
-    """Distance of ``here [N]`` to its so manieth nearest of ``rows [n, N]``."""
-    squared = np.square(rows - here).sum(axis=1)
-    return float(np.sqrt(np.partition(squared, neighbours - 1)[neighbours - 1]))
+def _loneliness(
+    rows: NDArray[np.float64], places: NDArray[np.float64], neighbours: int
+) -> NDArray[np.float64]:
+    """Distance of each of ``places [m, N]`` to its so manieth nearest of ``rows [n, N]``, ``[m]``."""
+    result = np.empty(len(places))
+    for start in range(0, len(places), AT_ONCE):
+        part = slice(start, start + AT_ONCE)
+        squared = sum(
+            np.square(here[:, None] - row) for here, row in zip(places[part].T, rows.T, strict=True)
+        )
+        result[part] = np.sqrt(np.partition(squared, neighbours - 1, axis=1)[:, neighbours - 1])
+    return result
+
+
+def _covered(starts: NDArray[np.float64], ends: NDArray[np.float64], times: int) -> NDArray[np.float64]:
+    """Where so many of some intervals overlap, as low and high ends in order, ``[k, 2]``."""
+    places = np.concatenate([starts, ends])
+    steps = np.repeat([1, -1], len(starts))
+    order = np.lexsort((-steps, places))  # what begins where another ends overlaps it
+    count = np.cumsum(steps[order])
+    is_start = (steps[order] == 1) & (count == times)
+    is_end = (steps[order] == -1) & (count == times - 1)
+    return np.stack([places[order][is_start], places[order][is_end]], axis=1)

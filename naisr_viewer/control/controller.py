@@ -25,12 +25,23 @@ from naisr_viewer.control.worker import Worker
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.files.exports import in_the_way, planned
 from naisr_viewer.panels.kinds import with_layout_of
+from naisr_viewer.panels.scales import fitted_limit, scale_of
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.drawer import Tab
-from naisr_viewer.state.explorer import ExplorerState, followed, opened, reset, reset_all, with_value
+from naisr_viewer.state.explorer import (
+    ExplorerState,
+    followed,
+    opened,
+    reset,
+    reset_all,
+    with_values,
+)
 from naisr_viewer.state.layouts import Layout, Panel
+from naisr_viewer.state.overlay import Overlay, Quantity, with_limit
+from naisr_viewer.state.patients import Named
 from naisr_viewer.state.questions import CLOSE_WINDOW, OPEN_ATLAS
 from naisr_viewer.state.requests import ExportChoice, SurfaceResult
+from naisr_viewer.state.support import Support
 from naisr_viewer.state.theme import ThemeChoice
 from naisr_viewer.views.main_window import MainWindow
 from naisr_viewer.words.numbers import in_words
@@ -115,10 +126,7 @@ class Controller(QObject):
 
     def show_atlas(self, card: AtlasCard, values: Mapping[str, float] = MappingProxyType({})) -> None:
         """Show an atlas that is open in the engine; covariates left out are at their mean."""
-        state = opened(self.state, card)
-        for name, value in values.items():
-            state = with_value(state, name, value)
-        self.begin(state)
+        self.begin(with_values(opened(self.state, card), tuple(values.items())))
 
     def begin(self, state: ExplorerState) -> None:
         """Show an atlas that is open in the engine, as it is in ``state``; nothing lies behind to undo."""
@@ -165,17 +173,25 @@ class Controller(QObject):
 
     def move(self, name: str, value: float) -> None:
         """A covariate is on its way; coarse surfaces follow it."""
-        if self._before_move is None:
-            self._before_move = self.state
-            self._window.shapes.set_moving(True)
-        self.go(self._moved(self._before_move, name, value))
+        self.move_all(((name, value),))
 
     def settle(self, name: str, value: float) -> None:
         """A covariate came to rest; what lies behind is one step to undo."""
+        self.settle_all(((name, value),))
+
+    def move_all(self, values: Named) -> None:
+        """As :meth:`move` for covariates that move together."""
+        if self._before_move is None:
+            self._before_move = self.state
+            self._window.shapes.set_moving(True)
+        self.go(self._moved(self._before_move, values))
+
+    def settle_all(self, values: Named) -> None:
+        """As :meth:`settle` for covariates that moved together."""
         before = self._before_move or self.state
         self._before_move = None
         self._window.shapes.set_moving(False)
-        self._conclude(before, self._moved(before, name, value))
+        self._conclude(before, self._moved(before, values))
 
     def reset(self, name: str) -> None:
         """One covariate to the patient's value, or to the population mean."""
@@ -205,9 +221,32 @@ class Controller(QObject):
         """Open a page beneath the shapes; None, or the page that is open, closes it."""
         self.go(replace(self.state, drawer=None if tab is self.state.drawer else tab))
 
+    def set_quantity(self, quantity: Quantity) -> None:
+        """Colour the surfaces by something else."""
+        self._see(replace(self.state.overlay, quantity=quantity))
+
+    def set_shared(self, is_shared: bool) -> None:
+        """Whether all surfaces with numbers of one unit share its scale."""
+        self._see(replace(self.state.overlay, is_shared=is_shared))
+
+    def set_limit(self, panel: Panel, limit: float) -> None:
+        """Move the end of a panel's colour scale."""
+        if (scale := scale_of(self.state, panel)) is not None:
+            self._see(with_limit(self.state.overlay, scale.key, limit))
+
+    def fit_limit(self, panel: Panel) -> None:
+        """Let a panel's colour scale end at the largest number that it shows."""
+        limit = fitted_limit(self.state, panel, self.shown)
+        if limit is not None:
+            self.set_limit(panel, limit)
+
     def set_follow(self, follow: bool) -> None:
         """Whether the other covariates follow the one that is moved."""
         self.go(replace(self.state, follow=follow))
+
+    def set_support(self, support: Support) -> None:
+        """Show the data over other covariates, or fold them away."""
+        self.go(replace(self.state, support=support))
 
     def set_theme(self, choice: ThemeChoice) -> None:
         """Colour the window and remember it."""
@@ -250,6 +289,10 @@ class Controller(QObject):
         window.undo_requested.connect(self.undo)
         window.redo_requested.connect(self.redo)
         window.layout_requested.connect(self.set_layout)
+        window.quantity_chosen.connect(self.set_quantity)
+        window.shared_toggled.connect(self.set_shared)
+        window.shapes.limit_moved.connect(self.set_limit)
+        window.shapes.fit_requested.connect(self.fit_limit)
         window.drawer_requested.connect(self.set_drawer)
         window.theme_requested.connect(self.set_theme)
         window.cancel_requested.connect(self.refinement.cancel)
@@ -259,9 +302,15 @@ class Controller(QObject):
         window.closing.connect(self.shutdown)
         window.covariates.value_moved.connect(self.move)
         window.covariates.value_settled.connect(self.settle)
+        window.covariates.values_moved.connect(self.move_all)
+        window.covariates.values_settled.connect(self.settle_all)
+        window.covariates.support_requested.connect(self.set_support)
         window.covariates.reset_requested.connect(self.reset)
         window.covariates.reset_all_requested.connect(self.reset_all)
         window.covariates.follow_toggled.connect(self.set_follow)
+
+    def _see(self, overlay: Overlay) -> None:
+        self.go(replace(self.state, overlay=overlay))
 
     def _conclude(self, before: ExplorerState, after: ExplorerState) -> None:
         self._timeline.record(before, after)
@@ -273,9 +322,10 @@ class Controller(QObject):
         if not self.questions.may_lose(CLOSE_WINDOW, self.state.patients):
             event.ignore()
 
-    def _moved(self, before: ExplorerState, name: str, value: float) -> ExplorerState:
-        state = with_value(self.state, name, value)
-        return followed(state, name, before.values) if state.follow else state
+    def _moved(self, before: ExplorerState, values: Named) -> ExplorerState:
+        """Of several that move together the first takes the others along."""
+        state = replace(with_values(self.state, values), touched=values[0][0])
+        return with_values(followed(state, values[0][0], before.values), values) if state.follow else state
 
     def _finish_move(self) -> None:
         """Something else comes; a movement that has not come to rest ends where it is."""

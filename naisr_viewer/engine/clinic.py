@@ -133,6 +133,7 @@ def _told(person: FittedPerson, number: int, surface: SurfaceResult) -> Fitted:
         seconds=fit.seconds,
         remarks=fit.remarks,
         is_valid=fit.is_valid,
+        covariances=tuple((one, other, value) for (one, other), value in fit.covariances.items()),
     )
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Cell, Layout, Panel
+from naisr_viewer.state.overlay import Map
 from naisr_viewer.state.patients import Named
 from naisr_viewer.state.requests import Scale, SurfaceRequest, SurfaceResult
 from naisr_viewer.words.captions import DOUBTFUL, NO_SURFACE, NOT_VALID, UNSEEN, Caption, large
@@ -45,6 +46,7 @@ class PanelKind:
         is_possible: whether an atlas can show it.
         is_there: whether a state has a place for a panel of this kind.
         away: how far a panel is from what is looked at; what is nearer is computed first.
+        is_mapped: whether its surface can be coloured by what covariates do to it.
         is_modelled: whether its surface is the shape model's, in which material points can be found.
     """
 
@@ -63,6 +65,7 @@ class PanelKind:
     is_possible: Callable[[AtlasCard], bool] = lambda _: True
     is_there: Callable[[ExplorerState, Panel], bool] = lambda *_: True
     away: Callable[[ExplorerState, Panel], float] = lambda *_: 0.0
+    is_mapped: bool = False
     is_modelled: bool = True
 
     @property
@@ -88,10 +91,11 @@ def asked(
     values: Named,
     person: int,
     before: tuple[int, Named] | None = None,
+    shown: Map | None = None,
 ) -> SurfaceRequest:
     """A request to the open atlas, see :class:`~naisr_viewer.state.requests.SurfaceRequest`."""
     assert state.atlas is not None
-    return SurfaceRequest(state.atlas.path, panel, values, resolution, person, before)
+    return SurfaceRequest(state.atlas.path, panel, values, resolution, person, before, shown)
 
 
 def caption_of(

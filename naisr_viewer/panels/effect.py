@@ -1,6 +1,7 @@
 """The disentangled shape of one covariate, Phi_i."""
 
 from naisr_viewer.panels.base import PanelKind, asked, caption_of
+from naisr_viewer.panels.maps import map_of
 from naisr_viewer.panels.shape import enclosed
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Layout, Panel
@@ -9,7 +10,7 @@ from naisr_viewer.state.requests import SurfaceRequest
 
 def _ask(state: ExplorerState, panel: Panel, resolution: int) -> SurfaceRequest:
     own = tuple(item for item in state.named if item[0] == panel.covariate)
-    return asked(state, panel, resolution, own, state.person)
+    return asked(state, panel, resolution, own, state.person, shown=map_of(state, panel.covariate))
 
 
 KIND = PanelKind(
@@ -22,6 +23,7 @@ KIND = PanelKind(
     layouts=frozenset({Layout.SIDE_BY_SIDE}),
     ask=_ask,
     caption=caption_of(enclosed),
+    is_mapped=True,
     covariates=lambda atlas: tuple(covariate.name for covariate in atlas.covariates),
     is_possible=lambda atlas: atlas.capabilities.disentangleable,
 )

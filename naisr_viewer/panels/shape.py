@@ -1,8 +1,10 @@
 """The full shape, Phi."""
 
-from naisr_viewer.panels.base import PanelKind, ask_full_shape, caption_of
-from naisr_viewer.state.layouts import FULL_SHAPE, Layout
-from naisr_viewer.state.requests import SurfaceResult
+from naisr_viewer.panels.base import PanelKind, asked, caption_of
+from naisr_viewer.panels.maps import map_of
+from naisr_viewer.state.explorer import ExplorerState
+from naisr_viewer.state.layouts import FULL_SHAPE, Layout, Panel
+from naisr_viewer.state.requests import SurfaceRequest, SurfaceResult
 from naisr_viewer.words.captions import LATER, Caption, large
 from naisr_viewer.words.numbers import volume
 
@@ -16,12 +18,17 @@ def enclosed(result: SurfaceResult) -> Caption:
     return Caption(large(volume(result.volume_cm3, result.volume_margin_cm3)), f"Enclosed volume{within}")
 
 
+def _ask(state: ExplorerState, panel: Panel, resolution: int) -> SurfaceRequest:
+    return asked(state, panel, resolution, state.named, state.person, shown=map_of(state))
+
+
 KIND = PanelKind(
     name=FULL_SHAPE.kind,
     title="Full shape",
     hint="The shape at all covariates together.",
     layouts=frozenset(Layout) - {Layout.MATRIX},
-    ask=ask_full_shape,
+    ask=_ask,
     caption=caption_of(enclosed),
     colour=COLOUR,
+    is_mapped=True,
 )

@@ -22,10 +22,12 @@ from naisr_viewer.program.display import ensure_display
 from naisr_viewer.program.headless import finish, take_screenshot
 from naisr_viewer.state.layouts import FULL_SHAPE, Layout
 from naisr_viewer.state.patients import Named, Reading
+from naisr_viewer.state.support import Support
 from naisr_viewer.views.main_window import MainWindow
 
 PIXELS = (1280, 800)
 SHOWN = {"age": 60.0, "weight": 19.0, "sex": -1.0}
+HARDLY_ANYONE: Named = (("age", 70.0), ("weight", 48.0))
 OTHER_SEED, AGE_MONTHS, LATER_MONTHS = 1000, 90.0, 36.0
 
 
@@ -72,7 +74,14 @@ def _pin_three_places(window: MainWindow, controller: Controller) -> None:
         finish(window, controller)
 
 
-SCENES = {"point": _pin_three_places}
+def _go_where_nobody_is(window: MainWindow, controller: Controller) -> None:
+    """Among the people behind the atlas: as heavy as hardly anyone of that age."""
+    window.unpin_requested.emit()
+    controller.set_support(Support("age", "weight", is_open=True))
+    controller.settle_all(HARDLY_ANYONE)
+
+
+SCENES = {"point": _pin_three_places, "support": _go_where_nobody_is}
 """The pictures of the user guide, by name; each scene starts where the one before it ended."""
 
 

@@ -11,8 +11,10 @@ from naisr_viewer.state.atlas_card import AtlasCard, RealVector
 from naisr_viewer.state.drawer import Tab, tabs_of
 from naisr_viewer.state.layouts import Cell, Layout
 from naisr_viewer.state.matrix import Matrix, first_matrix, values_at
+from naisr_viewer.state.overlay import NOTHING_SHOWN, Overlay
 from naisr_viewer.state.patients import Fitted, Named, OpenScan
 from naisr_viewer.state.pins import Pin, Point, with_pin
+from naisr_viewer.state.support import NOTHING_CHOSEN, Support, suited
 
 
 @dataclass(frozen=True)
@@ -30,7 +32,10 @@ class ExplorerState:
         has_ghost: whether the scan is drawn over the full shape.
         pins: places that are marked in all shapes, and told of.
         matrix: what shapes are laid out by in that layout; None where there are no two covariates.
+        overlay: what the surfaces are coloured by.
+        touched: the covariate that was moved last; empty before.
         drawer: the page that is open beneath the shapes; None where it is closed.
+        support: over which covariates the data behind the atlas are shown.
         is_atlas_changed: whether the file of the atlas has changed on the disk since it was read.
     """
 
@@ -44,7 +49,10 @@ class ExplorerState:
     has_ghost: bool = True
     pins: tuple[Pin, ...] = ()
     matrix: Matrix | None = None
+    overlay: Overlay = NOTHING_SHOWN
+    touched: str = ""
     drawer: Tab | None = None
+    support: Support = NOTHING_CHOSEN
     is_atlas_changed: bool = False
 
     @property
@@ -113,6 +121,7 @@ def opened(state: ExplorerState, atlas: AtlasCard) -> ExplorerState:
         has_ghost=state.has_ghost,
         matrix=first_matrix(atlas),
         drawer=drawer,
+        support=suited(state.support, atlas),
     )
 
 
@@ -123,6 +132,13 @@ def with_value(state: ExplorerState, name: str, value: float) -> ExplorerState:
     low, high = state.atlas.covariates[index].range
     held = min(max(value, low), high)
     return replace(state, values=(*state.values[:index], held, *state.values[index + 1 :]))
+
+
+def with_values(state: ExplorerState, values: Named) -> ExplorerState:
+    """Several covariates moved (real units), each held inside its observed range."""
+    for name, value in values:
+        state = with_value(state, name, value)
+    return state
 
 
 def followed(state: ExplorerState, name: str, start: RealVector) -> ExplorerState:
@@ -176,10 +192,8 @@ def without_patient(state: ExplorerState, key: int) -> ExplorerState:
 def showing(state: ExplorerState, key: int | None) -> ExplorerState:
     """Another patient, at what is known or found of them; None for the population average."""
     state = with_possible_layout(replace(state, patient=key))
-    state = replace(state, values=state.home)
-    for name, value in state.shown.known if state.shown and not state.fit else ():
-        state = with_value(state, name, value)
-    return state
+    known = state.shown.known if state.shown and not state.fit else ()
+    return with_values(replace(state, values=state.home), known)
 
 
 def pinned(state: ExplorerState, origin_mm: Point) -> ExplorerState:

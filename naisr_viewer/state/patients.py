@@ -95,6 +95,8 @@ class Fitted:
         seconds: what the fit took.
         remarks: what the shape does not settle, or that it was missed, a sentence each.
         is_valid: whether the shape was met; where not, nothing else here means anything.
+        covariances: of each pair of inferred continuous covariates, and of each with itself: two names, and
+            the product of their units.
     """
 
     person: int
@@ -107,6 +109,7 @@ class Fitted:
     seconds: float
     remarks: tuple[str, ...] = ()
     is_valid: bool = True
+    covariances: tuple[tuple[str, str, float], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

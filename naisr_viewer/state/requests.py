@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from naisr_viewer.state.camera import FROM_THE_FRONT, Camera
 from naisr_viewer.state.layouts import Panel
+from naisr_viewer.state.overlay import Map
 from naisr_viewer.state.patients import Named
 
 PREVIEW_RESOLUTION = 40
@@ -43,6 +44,7 @@ class SurfaceRequest:
         resolution: cells along a side of the box; below :data:`EXACT_RESOLUTION` a preview is wanted.
         person: whose code; 0 for the population average.
         before: of a change, person and covariate values that it is counted from.
+        map: what is shown on it, point by point; None for nothing.
     """
 
     atlas: Path
@@ -51,6 +53,7 @@ class SurfaceRequest:
     resolution: int
     person: int = 0
     before: tuple[int, Named] | None = None
+    map: Map | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,7 @@ from naisr_viewer.state.camera import Camera
 from naisr_viewer.state.explorer import ExplorerState, with_possible_layout
 from naisr_viewer.state.matrix import kept_matrix
 from naisr_viewer.state.patients import Named, OpenScan, Reading
+from naisr_viewer.state.support import suited
 
 
 @dataclass(frozen=True)
@@ -102,6 +103,7 @@ def state_of(session: Session, card: AtlasCard, patients: tuple[OpenScan, ...]) 
             matrix=kept_matrix(card, state.matrix),
             patient=state.patient if state.patient in keys else None,
             compared=state.compared if state.compared in keys else None,
+            support=suited(state.support, card),
         )
     )
 

@@ -21,6 +21,8 @@ PALENESS = 0.6
 """Share of the ground in the colour of a surface that is a guess."""
 
 PAPER = "#ffffff"
+PATIENT_COLOURS = ("#d6453d", "#1f9e8c", "#7a5cd0", "#b07d10", "#c2479a", "#5f8a1e")
+"""Of the patients that are open, wherever they are points among others; repeated beyond six."""
 
 SCALE_COLOURS: dict[Scale, tuple[str, ...]] = {
     "signed": (
@@ -72,6 +74,11 @@ def blend(colour: str, other: str, share: float) -> str:
 def pin_colour(number: int) -> str:
     """The colour of a pinned place, on the shapes and where it is told of."""
     return PIN_COLOURS[(number - 1) % len(PIN_COLOURS)]
+
+
+def patient_colour(key: int) -> str:
+    """The colour of an open patient among others."""
+    return PATIENT_COLOURS[(key - 1) % len(PATIENT_COLOURS)]
 
 
 def ghost_colour(theme: Theme) -> str:

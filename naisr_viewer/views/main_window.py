@@ -12,7 +12,9 @@ from PySide6.QtWidgets import QApplication, QHBoxLayout, QMainWindow, QWidget
 
 from naisr_model.shipped import shipped
 from naisr_viewer.panels.kinds import visible_panels
+from naisr_viewer.panels.maps import can_map, words_of_maps
 from naisr_viewer.panels.matrix import here
+from naisr_viewer.panels.scales import scale_of
 from naisr_viewer.state.drawer import Tab, tabs_of
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Layout
@@ -87,6 +89,8 @@ class MainWindow(QMainWindow):
     redo_requested = Signal()  # Edit > Redo
     layout_requested = Signal(object)  # a Layout from the View menu or the toolbar
     matrix_requested = Signal(object)  # a Matrix from the boxes above its cells
+    quantity_chosen = Signal(object)  # a Quantity that the surfaces shall be coloured by
+    shared_toggled = Signal(bool)  # whether all surfaces with numbers of one unit share its scale
     unpin_requested = Signal()  # Edit > Remove pins
     drawer_requested = Signal(object)  # a Tab of the drawer, or None to close it
     theme_requested = Signal(object)  # a ThemeChoice from the View menu
@@ -145,6 +149,7 @@ class MainWindow(QMainWindow):
         if len(state.patients) > len(old.patients):
             self._actions["patients"].setChecked(True)
         self.show_sides()
+        self._show_maps(state)
         self._show_panels(state)
         self._show_ghost(state)
         self._actions[f"layout {state.layout}"].setChecked(True)
@@ -169,6 +174,13 @@ class MainWindow(QMainWindow):
             self.shapes.show_panels(visible_panels(state), heads(state.atlas, matrix))
             self.shapes.show_colours(cell_colours(state))
             self.shapes.outline(here(state))
+
+    def _show_maps(self, state: ExplorerState) -> None:
+        """What the surfaces are coloured by; those of the matrix are plain."""
+        bar, is_matrix = self._centre.maps, state.layout is Layout.MATRIX
+        bar.setVisible(state.atlas is not None and can_map(state.atlas) and not is_matrix)
+        bar.show_overlay(state.overlay, words_of_maps(state))
+        self.shapes.show_scales({panel: scale_of(state, panel) for panel in visible_panels(state)})
 
     def _show_ghost(self, state: ExplorerState) -> None:
         scan = state.shown.scan if state.shown and state.has_ghost else None
@@ -325,7 +337,8 @@ class MainWindow(QMainWindow):
         return ask_label(self, labels)
 
     def grab_image(self) -> QImage:
-        """The whole window as a picture."""
+        """The whole window as a picture, with all that it will have in a moment."""
+        self._prepare_charts()
         return self.grab().toImage()
 
     def closeEvent(self, event: QCloseEvent) -> None:
@@ -377,12 +390,22 @@ class MainWindow(QMainWindow):
         self._recent.file_chosen.connect(self.open_requested)
         self._centre.empty.open_requested.connect(self.ask_atlas)
         self._centre.changed.reopen_requested.connect(self._ask_again)
+        self._centre.maps.quantity_chosen.connect(self.quantity_chosen)
+        self._centre.maps.shared_toggled.connect(self.shared_toggled)
         self._centre.drawer.tab_requested.connect(self.drawer_requested)
         self._centre.matrix.changed.connect(self.matrix_requested)
         self.patients.open_requested.connect(self.ask_scan)
         self.cancel.clicked.connect(self.cancel_requested)
         self.shapes.scale_changed.connect(self.scale.set_scale)
+        # Queued, so that the picture has reached the screen before charts are made.
+        self.shapes.drawn.connect(self._prepare_charts, Qt.ConnectionType.QueuedConnection)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._system_theme_changed)
+
+    def _prepare_charts(self) -> None:
+        """Once, after the first picture."""
+        if self.covariates.support.chart is None:
+            self.covariates.support.prepare()
+            in_order(self._stops)
 
     def _system_theme_changed(self) -> None:
         if self._theme_choice is ThemeChoice.SYSTEM:

@@ -65,23 +65,33 @@ def style_sheet(theme: Theme) -> str:
     QScrollBar:vertical:focus {{ background: {t.accent}; }}
     QScrollBar::add-line, QScrollBar::sub-line {{ height: 0; }}
     QScrollBar::add-page, QScrollBar::sub-page {{ background: transparent; }}
-    #patientBar QComboBox {{ background: {t.raised}; border: 1px solid {t.line}; border-radius: 5px;
+    ChoiceBox {{ background: {t.raised}; border: 1px solid {t.line}; border-radius: 5px;
                 padding: 3px 8px; color: {t.text}; }}
-    #patientBar QComboBox:hover, #patientBar QComboBox:focus {{ border-color: {t.accent}; }}
-    #patientBar QComboBox:disabled {{ color: {t.muted}; background: {t.window}; }}
-    #patientBar QComboBox::drop-down {{ border: none; width: 20px; }}
-    #patientBar QComboBox QAbstractItemView {{ background: {t.raised}; border: 1px solid {t.line};
+    ChoiceBox:hover, ChoiceBox:focus {{ border-color: {t.accent}; }}
+    ChoiceBox:disabled {{ color: {t.muted}; background: {t.window}; }}
+    ChoiceBox::drop-down {{ border: none; width: 20px; }}
+    ChoiceBox QAbstractItemView {{ background: {t.raised}; border: 1px solid {t.line};
                 selection-background-color: {t.accent}; selection-color: {t.on_accent}; outline: none; }}
-    #patientBar QComboBox QAbstractItemView::item {{ padding: 4px 8px; }}
+    ChoiceBox QAbstractItemView::item {{ padding: 4px 8px; }}
     QCheckBox::indicator:unchecked {{
                 background: {t.raised}; border: 1px solid {t.muted}; border-radius: 2px;
                 width: 12px; height: 12px; }}
     #small {{ padding: 1px 8px; font-size: 9pt; }}
+    #mapBar {{ background: {t.window}; border-bottom: 1px solid {t.line}; }}
+    #mapBar QToolButton {{ border: 1px solid {t.line}; padding: 2px 8px; background: {t.raised};
+                color: {t.text}; }}
+    #mapBar QToolButton:hover, #mapBar QToolButton:focus {{ border-color: {t.accent}; }}
+    #mapBar QToolButton:checked {{ background: {t.accent}; color: {t.on_accent}; border-color: {t.accent}; }}
+    #mapBar QToolButton:checked:focus {{ border-color: {t.text}; }}
     #drawer {{ background: {t.window}; border-top: 1px solid {t.line}; }}
     #drawer QToolButton {{ border: 1px solid transparent; border-radius: 4px; padding: 1px 10px;
                 color: {t.muted}; background: transparent; }}
     #drawer QToolButton:hover, #drawer QToolButton:focus {{ border-color: {t.accent}; }}
     #drawer QToolButton:checked {{ color: {t.text}; background: {t.line}; font-weight: 600; }}
+    #chart {{ border: 1px solid {t.line}; border-radius: 5px; }}
+    #chart:focus {{ border-color: {t.accent}; }}
+    #fold {{ border: 1px solid transparent; border-radius: 4px; font-weight: 600; padding: 2px; }}
+    #fold:focus {{ border-color: {t.accent}; }}
     #section {{ font-size: 11pt; font-weight: 600; }}
     #figure {{ font-weight: 600; }}
     #changed {{ background: {t.raised}; border: 1px solid {t.accent}; border-radius: 6px; }}

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
 from naisr_model.config import read_toml, require_ranges, to_json
 from naisr_model.covariates import Covariate, Population, complete, read_values
@@ -173,6 +174,53 @@ def test_where_there_are_data_and_what_is_in_range_are_two_questions(children):
     stranger = {"age": 12.0, "weight": 45.0}
     assert children.contains(stranger) and not children.has_data_at(stranger)
     assert not children.contains({"age": 12.0, "weight": 75.0})
+
+
+@pytest.fixture
+def loose() -> Population:
+    """Two hundred people over three continuous covariates and sex, with gaps between them."""
+    rng = np.random.default_rng(3)
+    names = tuple(f"S{number}" for number in range(200))
+    covariates = [
+        Covariate(name, "", "continuous", 0.0, 1.0, (-4.0, 4.0)) for name in ("one", "two", "three")
+    ]
+    middles = rng.choice([-2.0, 2.0], (200, 3))
+    values = np.hstack(
+        [(middles + rng.normal(0, 0.8, (200, 3))).clip(-4, 4), rng.choice([-1.0, 1.0], (200, 1))]
+    )
+    return Population((*covariates, SEX), names, names, values, np.arange(200) % 7 == 0)
+
+
+def test_how_far_people_are_is_the_distance_to_the_third_of_them(loose):
+    rng = np.random.default_rng(5)
+    places = rng.uniform(-4, 4, (600, 4)) * [1, 1, 1, 0.25]
+    tree = KDTree(loose.values[~loose.held_out][:, :3])
+    usual = np.quantile(tree.query(tree.data, 4)[0][:, 3], 0.98)
+    expected = tree.query(places[:, :3], 3)[0][:, 2] / usual
+    assert loose.remoteness(places) == pytest.approx(expected, rel=1e-9)
+    told = [loose.has_data_at(dict(zip(loose.names, place, strict=True))) for place in places]
+    assert told == (expected <= 1).tolist() and 0.1 < np.mean(told) < 0.9
+
+
+@pytest.mark.parametrize("name", ["one", "three"])
+def test_stretches_with_data_are_where_there_are_data(loose, name):
+    rng = np.random.default_rng(7)
+    counts = []
+    for place in rng.normal(0, 2.8, (40, 4)).clip(-4, 4):
+        values = dict(zip(loose.names, place, strict=True))
+        stretches = loose.stretches_with_data(name, values)
+        counts.append(len(stretches))
+        for value in np.linspace(-4, 4, 101):
+            is_inside = any(low <= value <= high for low, high in stretches)
+            assert is_inside == loose.has_data_at({**values, name: value})
+    assert min(counts) == 0 and max(counts) >= 2
+
+
+def test_a_level_has_data_wherever_its_people_may_be(loose):
+    assert loose.stretches_with_data("sex", {"one": 2.0, "two": 2.0, "three": 2.0}) == ((-1.0, 1.0),)
+    assert loose.stretches_with_data("sex", {"one": -4.0, "two": 4.0, "three": -4.0}) == ()
+    alone = loose.keeping({"sex"})
+    assert alone.stretches_with_data("sex", {}) == ((-1.0, 1.0),)
 
 
 def test_a_population_with_fewer_covariates_is_the_same_people(children):

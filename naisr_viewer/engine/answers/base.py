@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from naisr_model.progress import Progress
+from naisr_viewer.engine.maps import coloured
 from naisr_viewer.engine.people import FittedPerson
 from naisr_viewer.engine.previews import Previews
 from naisr_viewer.engine.surfaces import deviation_mm, from_mesh
@@ -91,11 +92,13 @@ def field_of_the_model(make: Make) -> Answer:
     """
 
     def give(source: Source, request: SurfaceRequest, progress: Progress) -> SurfaceResult:
+        if request.map is not None:
+            return _mapped(source, request, progress)
         _, fitted, tracker = source.who(request.atlas, request.person)
         if tracker is not None and request.resolution < EXACT_RESOLUTION:
             return source.previews.surface(request, tracker)
         atlas, start = source.atlas(request.atlas), time.perf_counter()
-        latent = None if fitted is None else fitted.at(request.values).latent
+        latent = _latent(fitted, request)
         mesh = make(atlas, request, latent, tracker, progress)
         progress.check()
         result = from_mesh(request, mesh, start)
@@ -108,6 +111,18 @@ def field_of_the_model(make: Make) -> Answer:
         return result
 
     return Answer(give, simplest, is_kept_coarse=True)
+
+
+def _mapped(source: Source, request: SurfaceRequest, progress: Progress) -> SurfaceResult:
+    """The plain surface, with the map that is asked for."""
+    shape = source.surface(replace(request, map=None), progress.part(0.0, 0.6))
+    progress.check()
+    _, fitted, tracker = source.who(request.atlas, request.person)
+    return coloured(request, shape, source.atlas(request.atlas), _latent(fitted, request), tracker)
+
+
+def _latent(fitted: FittedPerson | None, request: SurfaceRequest) -> NDArray[np.float64] | None:
+    return None if fitted is None else fitted.at(request.values).latent
 
 
 def simplest(request: SurfaceRequest, atlas: AtlasCard) -> SurfaceRequest:

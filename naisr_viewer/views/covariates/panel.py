@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QSignalBlocker, QSize, Qt, Signal
-from PySide6.QtWidgets import QFrame, QLabel, QPushButton, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtCore import QEvent, QObject, QSignalBlocker, QSize, Qt, Signal
+from PySide6.QtWidgets import QApplication, QFrame, QLabel, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.views.colours import covariate_colour
 from naisr_viewer.views.covariates.row import CovariateRow
+from naisr_viewer.views.covariates.support import SupportPanel
 from naisr_viewer.views.elided import ElidedCheckBox, ElidedLabel
 from naisr_viewer.views.focus import in_order
 from naisr_viewer.views.theme import Theme
@@ -28,6 +29,9 @@ class CovariatePanel(QFrame):
 
     value_moved = Signal(str, float)  # name, real value: a slider, key or wheel is on the way
     value_settled = Signal(str, float)  # name, real value: it came to rest
+    values_moved = Signal(object)  # Named, real values: covariates that move together are on the way
+    values_settled = Signal(object)  # Named, real values: they came to rest
+    support_requested = Signal(object)  # a Support: the data over other covariates, or folded the other way
     reset_requested = Signal(str)  # name: the row's reset button was pressed
     reset_all_requested = Signal()  # "Reset all" was pressed
     follow_toggled = Signal(bool)  # whether the others shall follow the covariate that is moved
@@ -47,6 +51,11 @@ class CovariatePanel(QFrame):
         self.follow.toggled.connect(self.follow_toggled)
         self.reset_all = QPushButton(self)
         self.reset_all.clicked.connect(self.reset_all_requested)
+        self.support = SupportPanel(self)
+        self.support.values_moved.connect(self.values_moved)
+        self.support.values_settled.connect(self.values_settled)
+        self.support.support_requested.connect(self.support_requested)
+        self.support.fold.clicked.connect(self._scroll_to_support, Qt.ConnectionType.QueuedConnection)
         self._area = QScrollArea(self)
         self._rows_area = QVBoxLayout()
         self._rows_area.setSpacing(22)
@@ -82,7 +91,7 @@ class CovariatePanel(QFrame):
     def stops(self) -> list[QWidget]:
         """What the Tab key goes through, as it is read."""
         rows = [stop for row in self.rows.values() for stop in row.stops]
-        return [self._area, *rows, self.follow, self.reset_all]
+        return [self._area, *rows, self.follow, self.reset_all, *self.support.stops]
 
     def show_values(self, state: ExplorerState) -> None:
         """Put every row at its value, and say where home is: the patient's values or the population mean."""
@@ -92,6 +101,7 @@ class CovariatePanel(QFrame):
         for (name, value), home in zip(state.named, state.home, strict=True):
             self.rows[name].set_home(home, fit is not None, intervals.get(name))
             self.rows[name].set_value(value)
+        self._show_support(state)
         with QSignalBlocker(self.follow):
             self.follow.setChecked(state.follow)
         self.reset_all.setText("Reset all" if fit is None else "Back to the patient")
@@ -102,15 +112,43 @@ class CovariatePanel(QFrame):
         """Say no more of movements that have not come to rest."""
         for row in self.rows.values():
             row.forget_move()
+        self.support.forget_move()
 
     def set_theme(self, theme: Theme) -> None:
         """Follow the theme."""
+        self.support.set_theme(theme)
         for row in self.rows.values():
             row.set_colours(theme)
 
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """There may be room for the data now, or none any more."""
+        if event.type() in (QEvent.Type.Resize, QEvent.Type.LayoutRequest):
+            self._show_room()
+        return super().eventFilter(watched, event)
+
+    def _show_support(self, state: ExplorerState) -> None:
+        """Say where the data are, of each covariate while the others are as they are."""
+        if state.atlas is not None:
+            values = dict(state.named)
+            for name, row in self.rows.items():
+                row.show_stretches(state.atlas.population.stretches_with_data(name, values))
+        self.support.show_state(state)
+
+    def _show_room(self) -> None:
+        """Say how high the data can be before the sliders have to be scrolled."""
+        width = self._area.viewport().width()
+        height = self._column.totalMinimumHeightForWidth(width)
+        mine = 0 if self.support.isHidden() else self.support.minimumSizeHint().height()
+        self.support.show_room(self._area.viewport().height() - height + mine)
+
+    def _scroll_to_support(self) -> None:
+        """Bring into sight what was unfolded, once it has its place."""
+        QApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest.value)
+        self._area.ensureWidgetVisible(self.support, 0, 0)
+
     def _compose(self) -> None:
         inside = QWidget(self)
-        column = QVBoxLayout(inside)
+        self._column = column = QVBoxLayout(inside)
         column.setContentsMargins(14, 16, 14, 16)
         column.setSpacing(4)
         column.addWidget(self.title)
@@ -121,11 +159,15 @@ class CovariatePanel(QFrame):
         column.addWidget(self.follow)
         column.addSpacing(10)
         column.addWidget(self.reset_all)
-        column.addStretch(1)
+        column.addSpacing(6)
+        column.addWidget(self.support, 1)
+        column.addStretch(0)
         self.follow.setVisible(False)
         self.reset_all.setVisible(False)
         self._area.setWidget(inside)
         self._area.setWidgetResizable(True)
+        for part in (self._area.viewport(), inside):
+            part.installEventFilter(self)
         self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         outer = QVBoxLayout(self)
         outer.setContentsMargins(0, 0, 1, 0)

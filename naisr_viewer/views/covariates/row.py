@@ -9,12 +9,13 @@ from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QToolButton, QVB
 
 from naisr_model.covariates import Covariate
 from naisr_viewer.views.covariates.histogram import Histogram
-from naisr_viewer.views.covariates.slider import JumpSlider, chosen_value, slider_position
+from naisr_viewer.views.covariates.slider import JumpSlider, chosen_value, share_of, slider_position
 from naisr_viewer.views.elided import ElidedLabel, unit_label
 from naisr_viewer.views.level_buttons import LevelButton, level_buttons
 from naisr_viewer.views.number_box import NumberBox
 from naisr_viewer.views.theme import Theme
 from naisr_viewer.words.numbers import mean_reading, reading
+from naisr_viewer.words.support import along
 from naisr_viewer.words.titles import as_tip, label
 
 NAME_PX = 32
@@ -89,6 +90,13 @@ class CovariateRow(QWidget):
             button.setChecked(button.level == value)
         self.reset.setEnabled(value != self._home)
         self.reading.setText(reading(self.covariate, value))
+
+    def show_stretches(self, stretches: tuple[tuple[float, float], ...]) -> None:
+        """Say where along the slider there are data, by low and high ends in real units."""
+        self.slider.show_stretches(
+            tuple((share_of(self.covariate, low), share_of(self.covariate, high)) for low, high in stretches)
+        )
+        self.slider.setToolTip(as_tip(along(self.covariate, stretches)))
 
     def forget_move(self) -> None:
         """Say no more of a movement that has not come to rest."""

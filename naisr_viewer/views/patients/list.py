@@ -14,6 +14,7 @@ from PySide6.QtWidgets import (
 )
 
 from naisr_viewer.state.patients import OpenScan
+from naisr_viewer.views.colours import patient_colour
 from naisr_viewer.views.elided import ElidedLabel
 from naisr_viewer.words.patients import found_volume
 from naisr_viewer.words.titles import as_tip
@@ -82,6 +83,8 @@ class PatientList(QListWidget):
         line = QHBoxLayout(row)
         line.setContentsMargins(9, 0, 4, 0)
         line.setSpacing(6)
+        if key is not None:
+            line.addWidget(_sign(key))
         line.addWidget(ElidedLabel(name), 1)
         for widget in (muted, *beside):
             line.addWidget(widget)
@@ -101,3 +104,10 @@ class PatientList(QListWidget):
     def _key(self) -> int | None:
         item = self.currentItem()
         return item.data(Qt.ItemDataRole.UserRole) if item else None
+
+
+def _sign(key: int) -> QLabel:
+    """What marks a patient among the data."""
+    sign = QLabel("▲")
+    sign.setStyleSheet(f"color: {patient_colour(key)}; font-size: 8pt;")
+    return sign

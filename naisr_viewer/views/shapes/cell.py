@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 
 from PySide6.QtCore import QRect, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QLabel, QWidget
 
 from naisr_viewer.panels.kinds import kind_of, title_of
+from naisr_viewer.panels.scales import PanelScale
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.layouts import Panel
-from naisr_viewer.state.requests import SurfaceResult
+from naisr_viewer.state.requests import Colouring, SurfaceResult
 from naisr_viewer.views.colours import panel_colour
 from naisr_viewer.views.elided import ElidedLabel
 from naisr_viewer.views.shapes.arrangement import CELL_STRIPS, Strips
-from naisr_viewer.views.shapes.colour_bar import HEIGHT_PX, WIDTH_PX, ColourBar
+from naisr_viewer.views.shapes.colour_bar import WIDTH_PX, ColourBar
 from naisr_viewer.words.captions import small
 
 MARGIN_PX = 10
@@ -26,14 +27,15 @@ ROOMY_PX = 116
 """A caption that is narrower has small letters; four words in usual ones are hardly wider."""
 
 
-def strips_of(panels: Sequence[Panel]) -> Strips:
-    """What stands around every shape; colour bars only where a panel has one."""
-    if any(panel.cell for panel in panels):
+def strips_of(cells: Mapping[Panel, Cell]) -> Strips:
+    """What stands around every shape; colour bars only where one has its colours explained."""
+    if columns_of(cells):
         return CELL_STRIPS
-    return Strips(bar=HEIGHT_PX if any(kind_of(panel).scale for panel in panels) else 0)
+    bars = (cell.bar.sizeHint().height() for cell in cells.values() if cell.bar and cell.scale)
+    return Strips(bar=max(bars, default=0))
 
 
-def columns_of(panels: Sequence[Panel]) -> int:
+def columns_of(panels: Iterable[Panel]) -> int:
     """How many sub-plots stand in a row, where they are cells of the matrix; 0 where they are not."""
     return max((panel.cell[0] + 1 for panel in panels if panel.cell is not None), default=0)
 
@@ -71,8 +73,9 @@ class Cell:
     Attributes:
         title: what stands above.
         caption: the label beneath.
-        bar: what its colours stand for; None where it has none.
+        bar: what its colours stand for; None where it never has any.
         words: what the caption says.
+        scale: of its colours; None where it has none now.
         result: the surface, or None as long as there is none.
     """
 
@@ -80,6 +83,7 @@ class Cell:
     caption: QLabel
     bar: ColourBar | None
     words: str = ""
+    scale: PanelScale | None = None
     result: SurfaceResult | None = None
 
     @property
@@ -90,7 +94,38 @@ class Cell:
     @property
     def widgets(self) -> list[QWidget]:
         """All that stands around the shape."""
-        return [self.title, self.caption, *([] if self.bar is None else [self.bar])]
+        return [self.title, self.caption]
+
+    def show_scale(self, scale: PanelScale | None) -> None:
+        """Say what the colours stand for; None where there are none."""
+        self.scale = scale
+        if self.bar is not None and scale is not None:
+            self.bar.show_unit(scale.scale, scale.unit)
+            if self.colouring is not None:
+                self.bar.set_limit(self.colouring.limit)
+
+    @property
+    def colouring(self) -> Colouring | None:
+        """The colours on the surface, to the end of the scale that was chosen."""
+        found = None if self.result is None else self.result.colouring
+        if found is None or self.scale is None or self.scale.limit is None:
+            return found
+        return replace(found, limit=self.scale.limit)
+
+    def show(self, is_seen: bool) -> None:
+        """Show all that stands around the shape, or hide it."""
+        for widget in self.widgets:
+            widget.setVisible(is_seen and widget.height() > 0)
+            widget.raise_()
+        if self.bar is not None:
+            self.bar.setVisible(is_seen and self.scale is not None)
+            self.bar.raise_()
+
+    def discard(self) -> None:
+        """Take it all away."""
+        for widget in (*self.widgets, self.bar):
+            if widget is not None:
+                widget.deleteLater()
 
     def place(self, area: QRect, strips: Strips) -> None:
         """The title above the shape; beneath it the colour bar, and the caption under that.
@@ -105,7 +140,7 @@ class Cell:
         self.caption.setGeometry(area.left(), top, area.width(), area.bottom() + 1 - top)
         if self.bar is not None:
             width = min(WIDTH_PX, area.width())
-            self.bar.setGeometry(area.left() + (area.width() - width) // 2, top, width, HEIGHT_PX)
+            self.bar.setGeometry(area.left() + (area.width() - width) // 2, top, width, strips.bar)
 
 
 def make_cell(panel: Panel, atlas: AtlasCard, parent: QWidget) -> Cell:
@@ -117,8 +152,8 @@ def make_cell(panel: Panel, atlas: AtlasCard, parent: QWidget) -> Cell:
     caption.setObjectName("caption")
     caption.setWordWrap(True)
     caption.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
-    scale = kind_of(panel).scale
-    bar = None if scale is None else ColourBar(scale, kind_of(panel).unit, parent)
+    kind = kind_of(panel)
+    bar = ColourBar(kind.scale or "signed", kind.unit, parent) if kind.scale or kind.is_mapped else None
     if bar is not None:
         bar.setToolTip(kind_of(panel).hint)
     return Cell(title, caption, bar)

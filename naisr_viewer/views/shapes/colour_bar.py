@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QLineF, QPointF, QRectF, QSize
-from PySide6.QtGui import QLinearGradient, QPainter, QPaintEvent, QPalette, QPen
+from PySide6.QtCore import QLineF, QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QLinearGradient, QMouseEvent, QPainter, QPaintEvent, QPalette, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from naisr_viewer.state.requests import Scale
@@ -12,7 +12,14 @@ from naisr_viewer.views.colours import SCALE_COLOURS
 WIDTH_PX = 300
 HEIGHT_PX = 38
 BAND_PX = 10
+GRIP_PX = 8
+"""Nearer to 0 than this no end is drawn."""
+
 """Height of the colours."""
+
+LINE_PX = 15
+LONG_UNIT = 5
+"""Letters from which on a unit has a line of its own."""
 
 WIDEST = "+88.8"
 """The colours leave room for half of such a number beside them, and for the unit."""
@@ -34,11 +41,15 @@ class ColourBar(QWidget):
         parent: the widget around it.
     """
 
+    limit_moved = Signal(float)  # an end of the scale was dragged; what the high end shall stand for
+    fit_requested = Signal()  # a double-click: the scale shall fit what is shown
+
     def __init__(self, scale: Scale, unit: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._scale: Scale = scale
         self._unit = f" {unit}"
         self.limit: float | None = None
+        self._grip: tuple[float, float] | None = None  # where an end was taken, and the limit then
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
 
     def set_limit(self, limit: float) -> None:
@@ -47,15 +58,27 @@ class ColourBar(QWidget):
             self.limit = limit
             self.update()
 
+    def show_unit(self, scale: Scale, unit: str) -> None:
+        """Say what the numbers are."""
+        if (scale, f" {unit}") != (self._scale, self._unit):
+            self._scale, self._unit = scale, f" {unit}"
+            self.update()
+
     def sizeHint(self) -> QSize:
-        """Room for the colours, and the labels beneath."""
-        return QSize(WIDTH_PX, HEIGHT_PX)
+        """Room for the colours, the labels beneath, and a line for a long unit."""
+        return QSize(WIDTH_PX, HEIGHT_PX + (LINE_PX if self._is_long else 0))
+
+    @property
+    def _is_long(self) -> bool:
+        """Whether the unit would leave no room for the colours beside it."""
+        return len(self._unit) > LONG_UNIT
 
     @property
     def band(self) -> QRectF:
         """Where the colours are."""
         advance = self.fontMetrics().horizontalAdvance
-        margin = round(advance(WIDEST) / 2 + advance(self._unit)) + 2.5
+        beside = 0 if self._is_long else advance(self._unit)
+        margin = round(advance(WIDEST) / 2 + beside) + 2.5
         return QRectF(margin, 4.5, self.width() - 2 * margin, BAND_PX)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
@@ -69,8 +92,36 @@ class ColourBar(QWidget):
             low, middle, high = labels(self.limit, self._scale)
             _draw_label(painter, band.bottomLeft(), low)
             _draw_label(painter, QPointF(round(band.center().x()) + 0.5, band.bottom()), middle)
-            _draw_label(painter, band.bottomRight(), high, self._unit)
+            _draw_label(painter, band.bottomRight(), high, "" if self._is_long else self._unit)
+        if self._is_long:
+            line = QRectF(0, self.height() - LINE_PX - 2, self.width(), LINE_PX)
+            painter.drawText(line, Qt.AlignmentFlag.AlignCenter, self._unit.strip())
         painter.end()
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Take the nearer end."""
+        if event.button() is Qt.MouseButton.LeftButton and self.limit is not None:
+            self._grip = event.position().x(), self.limit
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Let the end stand for more as it is drawn inwards, and for less outwards."""
+        if self._grip is None:
+            return
+        start, limit = self._grip
+        band = self.band
+        zero = band.center().x() if self._scale == "signed" else band.left()
+        reach = max(abs(start - zero), GRIP_PX)
+        now = max((event.position().x() - zero) * (1.0 if start >= zero else -1.0), GRIP_PX)
+        self.limit_moved.emit(limit * reach / now)
+
+    def mouseReleaseEvent(self, _event: QMouseEvent) -> None:
+        """Leave the end where it is."""
+        self._grip = None
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        """Ask for the scale that fits."""
+        if event.button() is Qt.MouseButton.LeftButton:
+            self.fit_requested.emit()
 
     def _gradient(self, band: QRectF) -> QLinearGradient:
         gradient = QLinearGradient(band.topLeft(), band.topRight())

@@ -43,8 +43,7 @@ class Grid:
     def clear(self) -> None:
         """Take everything away."""
         for cell in self.cells.values():
-            for widget in cell.widgets:
-                widget.deleteLater()
+            cell.discard()
         for line in self._lines:
             line.deleteLater()
         self.cells, self._lines, self._areas = {}, [], {}
@@ -81,9 +80,7 @@ class Grid:
         for panel, cell in self.cells.items():
             if panel in areas:
                 cell.place(areas[panel], strips)
-            for widget in cell.widgets:
-                widget.setVisible(panel in areas and widget.height() > 0)
-                widget.raise_()
+            cell.show(panel in areas)
         self._place_lines(list(areas.values()))
         self.outline(self._outlined)
 
@@ -95,6 +92,11 @@ class Grid:
             self._outline.setGeometry(area)
             self._outline.raise_()
         self._outline.setVisible(area is not None)
+
+    def show(self) -> None:
+        """Show what the cells that have an area have now."""
+        for panel, cell in self.cells.items():
+            cell.show(panel in self._areas)
 
     def _place_lines(self, areas: Sequence[QRect]) -> None:
         for line in self._lines:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +13,7 @@ from PySide6.QtGui import QMouseEvent, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
 
 from naisr_viewer.panels.kinds import all_panels
+from naisr_viewer.panels.scales import PanelScale
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.camera import Camera
 from naisr_viewer.state.layouts import FULL_SHAPE, Panel
@@ -41,6 +43,7 @@ if TYPE_CHECKING:
 
 NO_FACES = np.zeros((0, 3), np.int64)
 
+
 Marks = Mapping[Panel, Sequence[tuple[tuple[float, float, float], str]]]
 """Places (mm) and colours (``#rrggbb``) of the dots on each surface."""
 
@@ -57,6 +60,8 @@ class ShapeView(QWidget):
 
     scale_changed = Signal(float)  # pixels per millimetre, after zooming or resizing
     drawn = Signal(int)  # the picture is on its way to the screen; how many sub-plots were drawn anew
+    limit_moved = Signal(object, float)  # a Panel, and what the end of its colour scale shall stand for
+    fit_requested = Signal(object)  # a Panel whose colour scale shall fit what is shown
     clicked = Signal(object, object)  # a short click on a surface: its Panel, and the point there (mm)
     chosen = Signal(object)  # a short click on a sub-plot, beside its surface too: its Panel
     opened = Signal(object)  # a double click on a sub-plot, after that: its Panel
@@ -116,6 +121,10 @@ class ShapeView(QWidget):
         self.prepare()
         self._atlas, self._visible, self._wanted = atlas, (), None
         self._grid.fill(all_panels(atlas), atlas)
+        for panel, cell in self._grid.cells.items():
+            if cell.bar is not None:
+                cell.bar.limit_moved.connect(lambda limit, panel=panel: self.limit_moved.emit(panel, limit))
+                cell.bar.fit_requested.connect(lambda panel=panel: self.fit_requested.emit(panel))
         self._ghost, self._marks, self._colours = (None, NO_FACES), {}, {}
         self._direction = OBLIQUE
         self._theme = theme
@@ -154,11 +163,23 @@ class ShapeView(QWidget):
         """Replace one surface in place; all that are replaced before Qt paints again share one painting."""
         cell = self._grid.cells[result.request.panel]
         cell.result = result
-        if cell.bar is not None and result.colouring is not None:
-            cell.bar.set_limit(result.colouring.limit)
+        cell.show_scale(cell.scale)
         if self._canvas is not None:
-            self._canvas.set_surface(self._grid.index(result.request.panel), result)
+            self._paint(result.request.panel)
             self._look_after()
+
+    def show_scales(self, scales: Mapping[Panel, PanelScale | None]) -> None:
+        """Say what the colours of surfaces stand for; those left out have none."""
+        had = self._strips
+        for panel, cell in self._grid.cells.items():
+            before = cell.scale
+            cell.show_scale(scales.get(panel))
+            if cell.scale != before and self._canvas is not None:
+                self._paint(panel)
+        if self._strips != had:
+            self._arrange()
+        else:
+            self._grid.show()
 
     def clear_surface(self, panel: Panel) -> None:
         """Show nothing until the next surface comes."""
@@ -280,15 +301,20 @@ class ShapeView(QWidget):
         self._framed = self._looked_after = False
         self.set_theme(self._theme)
         self._canvas.set_moving(self._moving)
-        for index, cell in enumerate(self._grid.cells.values()):
-            if cell.result is not None:
-                self._canvas.set_surface(index, cell.result)
+        for panel in self._grid.cells:
+            self._paint(panel)
         self._canvas.set_ghost(self._grid.index(FULL_SHAPE), *self._ghost)
         for panel in self._marks:
             self._mark(panel)
         self.show_colours(self._colours)
         self._arrange()
         self._look_after()
+
+    def _paint(self, panel: Panel) -> None:
+        """A surface in the colours of its scale."""
+        cell = self._grid.cells[panel]
+        if cell.result is not None and self._canvas is not None:
+            self._canvas.set_surface(self._grid.index(panel), replace(cell.result, colouring=cell.colouring))
 
     def _mark(self, panel: Panel) -> None:
         if self._canvas is not None:
@@ -350,7 +376,7 @@ class ShapeView(QWidget):
         if not self._visible or not self.width() or not self.height():
             return
         wide_mm, high_mm = self._seen_mm
-        strips = strips_of(self._visible)
+        strips = self._strips
         rows, room = self._rows(strips, wide_mm / high_mm)
         show_rows(self.row_bar, rows)
         places = areas_for(len(self._visible), self._within(room), rows, self.row_bar.value())
@@ -387,6 +413,10 @@ class ShapeView(QWidget):
     def _within(self, room: QSize) -> QSize:
         """What is left beside the heads."""
         return room.shrunkBy(self._margins)
+
+    @property
+    def _strips(self) -> Strips:
+        return strips_of({panel: self._grid.cells[panel] for panel in self._visible})
 
     @property
     def _margins(self) -> QMargins:

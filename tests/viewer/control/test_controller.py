@@ -26,6 +26,7 @@ from naisr_viewer.state.requests import (
     Origin,
     SurfaceResult,
 )
+from naisr_viewer.state.support import Support
 from naisr_viewer.state.theme import ThemeChoice
 from naisr_viewer.views.covariates.panel import CovariatePanel
 from naisr_viewer.views.main_window import MainWindow
@@ -44,6 +45,8 @@ class WindowSignals(QObject):
     layout_requested = Signal(object)
     theme_requested = Signal(object)
     drawer_requested = Signal(object)
+    quantity_chosen = Signal(object)
+    shared_toggled = Signal(bool)
     cancel_requested = Signal()
     about_requested = Signal()
     preferences_requested = Signal()
@@ -54,6 +57,9 @@ class WindowSignals(QObject):
 class PanelSignals(QObject):
     value_moved = Signal(str, float)
     value_settled = Signal(str, float)
+    values_moved = Signal(object)
+    values_settled = Signal(object)
+    support_requested = Signal(object)
     reset_requested = Signal(str)
     reset_all_requested = Signal()
     follow_toggled = Signal(bool)
@@ -61,6 +67,8 @@ class PanelSignals(QObject):
 
 class ShapeSignals(QObject):
     drawn = Signal(int)
+    limit_moved = Signal(object, float)
+    fit_requested = Signal(object)
 
 
 def with_signals(fake: Mock, signals: QObject) -> Mock:
@@ -188,6 +196,24 @@ def test_one_drag_is_one_step_to_undo(ready, window):
     window.show_history.assert_called_with(False, True)
     window.redo_requested.emit()
     assert dict(ready.state.named)["age"] == 130.0
+
+
+def test_covariates_that_move_together_are_one_step_to_undo(ready, window):
+    """And the second stays where it was put, also where it would follow the first."""
+    window.covariates.signals.follow_toggled.emit(True)
+    for age, weight in ((110.0, 60.0), (120.0, 20.0)):
+        window.covariates.values_moved.emit((("age", age), ("weight", weight)))
+        assert ready.state.values == (age, weight, 0.0) and ready.is_moving
+    window.covariates.values_settled.emit((("age", 120.0), ("weight", 20.0)))
+    window.undo_requested.emit()
+    assert ready.state.values == (100.0, 35.0, 0.0)
+    window.show_history.assert_called_with(False, True)
+
+
+def test_how_the_data_are_shown_is_no_step_to_undo(ready, window):
+    window.covariates.support_requested.emit(Support("sex", "age", True))
+    assert ready.state.support == Support("sex", "age", True)
+    window.show_history.assert_called_with(False, False)
 
 
 def test_undo_comes_before_a_movement_counts_as_at_rest(ready, window):

@@ -17,6 +17,7 @@ from naisr_viewer.state.layouts import Layout
 from naisr_viewer.state.patients import Reading
 from naisr_viewer.state.pins import Pin
 from naisr_viewer.state.session import SavedAtlas, SavedFit, SavedPatient, Session
+from naisr_viewer.state.support import Support
 
 BESIDE = {"atlas", "patients", "is_atlas_changed"}
 """Fields of a state that a session has elsewhere, or not."""
@@ -35,6 +36,7 @@ def everything(folder: Path) -> Session:
             has_ghost=False,
             pins=(Pin(2, (0.1, -2.0, 3.5)),),
             drawer=Tab.POINT,
+            support=Support("sex", "age", True),
         ),
         (
             SavedPatient(1, "a", Reading(folder / "a.stl", 3)),

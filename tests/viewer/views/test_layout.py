@@ -36,6 +36,7 @@ from naisr_viewer.state.theme import ThemeChoice
 from naisr_viewer.views.drawer import Drawer
 from naisr_viewer.views.elided import ElidedLabel
 from naisr_viewer.views.main_window import MainWindow
+from naisr_viewer.views.map_bar import MapBar
 
 W = TypeVar("W", bound=QWidget)
 
@@ -233,8 +234,8 @@ def stops(window: QWidget, first: QWidget) -> list[QWidget]:
 def region(window: MainWindow, widget: QWidget) -> tuple[int, int]:
     """Which part of the window a widget is in, from left to right and then down; above, in or below what
     scrolls there."""
-    (drawer,) = window.findChildren(Drawer)
-    parts = [window.covariates, window.shapes, drawer, window.patients, window.statusBar()]
+    (drawer,), (maps,) = window.findChildren(Drawer), window.findChildren(MapBar)
+    parts = [window.covariates, maps, window.shapes, drawer, window.patients, window.statusBar()]
     part = next(index for index, part in enumerate(parts) if part.isAncestorOf(widget))
     areas = parts[part].findChildren(QScrollArea)
     if not areas or areas[0].isAncestorOf(widget):

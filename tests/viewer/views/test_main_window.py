@@ -86,6 +86,38 @@ def test_a_drag_with_the_mouse_ends_exact_and_leaves_no_queue(ready, qtbot, atla
     assert {what for what, _, _ in atlas.calls} == {"age", "shape"}
 
 
+def test_the_ring_among_the_data_is_dragged_like_both_sliders(ready, qtbot, atlas):
+    window, controller = ready
+    window.resize(960, 900)
+    qtbot.waitUntil(lambda: window.covariates.support.chart is not None, timeout=5000)
+    chart = window.covariates.support.chart
+    qtbot.waitUntil(chart.isVisible, timeout=5000)
+    wait_idle(qtbot, controller)
+    QTest.qWait(50)  # the axes take their room
+    start, goal = chart.place_of(100, 35).toPoint(), chart.place_of(180, 62).toPoint()
+    QTest.mousePress(chart.viewport(), Qt.MouseButton.LeftButton, pos=start)
+    for step in range(1, 11):
+        QTest.mouseMove(chart.viewport(), start + (goal - start) * step / 10)
+        QTest.qWait(5)
+    qtbot.waitUntil(lambda: "Preview" in window.status.text(), timeout=5000)
+    assert controller.is_moving
+    QTest.mouseRelease(chart.viewport(), Qt.MouseButton.LeftButton, pos=goal)
+    wait_idle(qtbot, controller)
+    age, weight, _ = moved = controller.state.values
+    assert (age, weight) == pytest.approx((180, 62), abs=2)
+    assert (window.covariates.rows["age"].box.value, window.covariates.rows["weight"].box.value) == (
+        age,
+        weight,
+    )
+    assert dict(controller.shown[FULL_SHAPE].request.values) == dict(controller.state.named)
+    press_keys(window, "Ctrl+Z")
+    assert controller.state.values == (100.0, 35.0, 0.0)
+    assert not next(a for a in window.findChildren(QAction) if a.text() == "Undo").isEnabled()
+    press_keys(window, "Ctrl+Shift+Z")
+    assert controller.state.values == moved
+    wait_idle(qtbot, controller)
+
+
 def test_previews_are_seen_while_the_mouse_moves(ready, qtbot, atlas):
     window, controller = ready
     atlas.steps, atlas.step_s = 3, 0.01

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -31,10 +32,42 @@ def test_unknown_covariates_are_inferred_with_their_intervals(atlas):
     assert fit.covariates["sex"] == 1 and fit.intervals["sex"][1] == 1
     low, high = fit.volume_interval_cm3
     assert low < egg(7.0, 1.0).volume / 1000 < high
+    low, high = fit.intervals["age"]
+    assert set(fit.covariances) == {("age", "age")}  # and not of a level
+    assert 1.96 * fit.covariances["age", "age"] ** 0.5 == pytest.approx((high - low) / 2, rel=0.2)
     known_age = atlas.fit(egg(7.0, 1.0), {"age": 7.0})
+    assert known_age.covariances == {}
     assert set(known_age.intervals) == {"sex"} and known_age.covariates["sex"] == 1
     known_sex = atlas.fit(egg(7.0, 1.0), {"sex": 1.0})
     assert set(known_sex.intervals) == {"age"} and len(known_sex.alternatives) == 1
+
+
+def test_covariances_are_of_all_explanations_together(atlas, made):
+    """Against draws from the mixture, about the values of the more probable part."""
+    fit, (age, sex) = atlas.fit(made[2], made[0]), atlas.covariates
+    two = dataclasses.replace(age, name="two", scale=3.0)
+    means, spreads = np.array([[0.3, -0.2, 1.0], [0.9, 0.5, -1.0]]), np.array([[0.2, 0.1], [0.1, 0.3]])
+    explanations = tuple(
+        dataclasses.replace(
+            fit.results[0], covariates=mean, free=np.array([0, 1]), spread=(1 + k) * spreads, surprise=3.0 * k
+        )
+        for k, mean in enumerate(means)
+    )
+    individual = SimpleNamespace(atlas=SimpleNamespace(covariates=(age, two, sex)))
+    found = dataclasses.replace(fit, individual=individual, results=explanations).covariances
+    rng = np.random.default_rng(0)
+    count = round(200_000 / (1 + np.exp(-1.5)))
+    draws = np.vstack(
+        [
+            rng.multivariate_normal(means[0, :2], spreads, count),
+            rng.multivariate_normal(means[1, :2], 2 * spreads, 200_000 - count),
+        ]
+    )
+    offsets = (draws - means[0, :2]) * [age.scale, 3.0]
+    expected = offsets.T @ offsets / len(offsets)
+    for i, one in enumerate(("age", "two")):
+        for j, other in enumerate(("age", "two")):
+            assert found[one, other] == pytest.approx(expected[i, j], rel=0.02)
 
 
 def test_the_same_shape_has_the_same_fit(atlas, made):

@@ -18,6 +18,7 @@ from pytestqt.qtbot import QtBot
 
 from naisr_viewer.panels import scan, shape
 from naisr_viewer.panels.kinds import all_panels, kind_of, panels_in, request_for
+from naisr_viewer.panels.scales import PanelScale
 from naisr_viewer.program.headless import pause
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState, opened, with_value
@@ -492,14 +493,26 @@ def test_a_moved_coloured_surface_is_drawn_like_a_new_one(views, surfaces):
     np.testing.assert_array_equal(pixels(views), in_place)
 
 
+def scales_of(panels) -> dict[Panel, PanelScale]:
+    """What kinds of view with numbers of their own have."""
+    kinds = {panel: kind_of(panel) for panel in panels}
+    return {
+        panel: PanelScale(kind.scale, kind.unit, panel.kind, None)
+        for panel, kind in kinds.items()
+        if kind.scale
+    }
+
+
 def test_a_colour_bar_stands_between_shape_and_caption(views, card):
     with_bar = set()
     for panels in (panels_in(layout, card) for layout in Layout):
         views.show_panels(panels)
+        views.show_scales(scales_of(panels))
         with_bar |= {panel for panel in panels if beneath(views, panel, ColourBar) is not None}
     assert with_bar == {panel for panel in all_panels(card) if kind_of(panel).scale}
     assert with_bar >= {SCAN, UNCERTAINTY, CHANGE}
     views.show_panels(panels_in(Layout.FIT, card))
+    views.show_scales(scales_of(panels_in(Layout.FIT, card)))
     bar, shape, below = beneath(views, SCAN, ColourBar), inside(views, SCAN)[0], caption(views, SCAN)
     assert bar is not None
     place = bar.geometry()
@@ -513,6 +526,7 @@ def test_a_colour_bar_stands_between_shape_and_caption(views, card):
 
 def test_the_bar_keeps_its_numbers_while_a_preview_is_plain(views, surfaces):
     views.show_panels((BEFORE, FULL_SHAPE, CHANGE))
+    views.show_scales(scales_of((BEFORE, FULL_SHAPE, CHANGE)))
     bar = beneath(views, CHANGE, ColourBar)
     assert bar is not None
     assert bar.limit is None
@@ -524,7 +538,9 @@ def test_the_bar_keeps_its_numbers_while_a_preview_is_plain(views, surfaces):
 def test_the_usual_layouts_have_no_strip_for_bars(view, card):
     usual, labels = pixels(view), caption(view, FULL_SHAPE).geometry()
     view.show_panels((FULL_SHAPE, SCAN, UNCERTAINTY))
+    view.show_scales(scales_of((FULL_SHAPE, SCAN, UNCERTAINTY)))
     view.show_panels(panels_in(Layout.SIDE_BY_SIDE, card))
+    view.show_scales({})
     np.testing.assert_array_equal(pixels(view), usual)
     assert caption(view, FULL_SHAPE).geometry() == labels
     assert not any(bar.isVisible() for bar in view.findChildren(ColourBar))

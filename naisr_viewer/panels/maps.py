@@ -1,0 +1,66 @@
+"""What covariates do to the surfaces of the shape model, as colours on them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from naisr_model.covariates import Covariate
+from naisr_viewer.state.atlas_card import AtlasCard
+from naisr_viewer.state.explorer import ExplorerState
+from naisr_viewer.state.overlay import Map, Quantity
+from naisr_viewer.words.maps import MILLIMETRES, rate_unit, told
+
+
+class Told(NamedTuple):
+    """Numbers on a surface.
+
+    Attributes:
+        unit: of them.
+        array: what they are called in a file.
+    """
+
+    unit: str
+    array: str
+
+
+def can_map(atlas: AtlasCard) -> bool:
+    """Whether it is known what each covariate does to a material point."""
+    return atlas.capabilities.trackable and atlas.capabilities.disentangleable and bool(atlas.covariates)
+
+
+def map_of(state: ExplorerState, covariate: str = "") -> Map | None:
+    """What a surface is coloured by; None where it is plain.
+
+    Args:
+        state: the situation.
+        covariate: whose effect the surface is; left out, that of all of them, whose rate is of the one that
+            was moved last.
+    """
+    quantity = state.overlay.quantity
+    if quantity is Quantity.PLAIN or state.atlas is None or not can_map(state.atlas):
+        return None
+    if quantity is Quantity.DISPLACEMENT:
+        return Map(quantity)
+    return Map(quantity, covariate or state.touched or state.atlas.covariates[0].name)
+
+
+def told_of(atlas: AtlasCard, shown: Map) -> Told:
+    """Unit and name of the numbers of a map."""
+    if shown.quantity is Quantity.DISPLACEMENT:
+        return Told(MILLIMETRES, "displacement_mm")
+    covariate = covariate_of(atlas, shown)
+    kind = "contrast" if covariate.kind == "binary" else "rate"
+    return Told(rate_unit(covariate), f"{kind}_of_{covariate.name}")
+
+
+def covariate_of(atlas: AtlasCard, shown: Map) -> Covariate:
+    """What a rate is of."""
+    return atlas.covariates[atlas.index(shown.covariate)]
+
+
+def words_of_maps(state: ExplorerState) -> str:
+    """What the numbers on the full shape are of, where that is a choice."""
+    shown = map_of(state)
+    if shown is None or state.atlas is None or not shown.covariate:
+        return ""
+    return told(covariate_of(state.atlas, shown))

@@ -1,0 +1,51 @@
+"""What is said of maps: their units, and what their colours mean."""
+
+from __future__ import annotations
+
+from naisr_model.covariates import Covariate
+from naisr_viewer.state.overlay import Quantity
+from naisr_viewer.words.titles import label
+
+MILLIMETRES = "mm"
+
+TITLES = {Quantity.PLAIN: "Plain", Quantity.DISPLACEMENT: "mm", Quantity.RATE: "mm per unit"}
+"""What the choices are called."""
+
+HINTS = {
+    Quantity.PLAIN: "Each surface in its own colour.",
+    Quantity.DISPLACEMENT: (
+        "How far each point has come from the template along the surface's normal, in mm: orange outwards "
+        "(+), blue inwards (−). An effect shows what its covariate does alone, the full shape what all do "
+        "together."
+    ),
+    Quantity.RATE: (
+        "How fast each point moves outwards with a covariate, in mm per month, per kg, …; of a binary one, "
+        "how much farther out it is at the second level than at the first. On the full shape that is the "
+        "covariate that was moved last."
+    ),
+}
+"""What each choice shows."""
+
+
+SHARED = "One scale"
+SHARED_HINT = (
+    "All surfaces with numbers of one unit share its colour scale. Drag an end of a scale to move it; a "
+    "double-click fits it to what is shown."
+)
+
+
+def rate_unit(covariate: Covariate) -> str:
+    """Millimetres per unit of a covariate: ``mm per month``, ``mm, M against F``."""
+    if covariate.kind == "binary":
+        return f"mm, {covariate.levels[1]} against {covariate.levels[0]}"
+    return f"mm per {_one(covariate.unit) or 'unit'}"
+
+
+def told(covariate: Covariate | None) -> str:
+    """What the numbers on the full shape are of; empty where they are of all covariates."""
+    return "" if covariate is None else f"Full shape: {label(covariate.name)}, {rate_unit(covariate)}"
+
+
+def _one(unit: str) -> str:
+    """``months`` is one ``month``; ``kg`` and ``mmHg`` are as they are."""
+    return unit[:-1] if len(unit) > 3 and unit.endswith("s") else unit
