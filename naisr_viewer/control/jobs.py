@@ -28,6 +28,9 @@ from naisr_viewer.state.session import Session
 COMPUTING = 0.7
 """Of the time that a figure takes."""
 
+AT_ONCE = 6
+"""Previews that are waited for before any is painted."""
+
 Surfaces = tuple[SurfaceResult, ...]
 
 
@@ -52,10 +55,15 @@ def opening(engine: Engine, path: Path) -> Job[AtlasCard]:
 
 
 def frame(engine: Engine, requests: Sequence[SurfaceRequest]) -> Job[Surfaces]:
-    """All surfaces of one moment, handed over together so that they are painted together."""
-    return lambda deliver, progress: deliver(
-        tuple(engine.surface(request, progress.quiet) for request in requests)
-    )
+    """All surfaces of one moment, handed over together so that they are painted together; many in groups."""
+
+    def job(deliver: Deliver[Surfaces], progress: Progress) -> None:
+        for start in range(0, len(requests), AT_ONCE):
+            progress.check()
+            group = requests[start : start + AT_ONCE]
+            deliver(tuple(engine.surface(request, progress.quiet) for request in group))
+
+    return job
 
 
 def one_by_one(engine: Engine, requests: Sequence[SurfaceRequest]) -> Job[Surfaces]:

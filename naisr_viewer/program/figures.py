@@ -81,7 +81,14 @@ def _go_where_nobody_is(window: MainWindow, controller: Controller) -> None:
     controller.settle_all(HARDLY_ANYONE)
 
 
-SCENES = {"point": _pin_three_places, "support": _go_where_nobody_is}
+def _lay_out(window: MainWindow, controller: Controller) -> None:
+    """By age and weight, nearest to a child of five."""
+    controller.set_support(Support("age", "weight"))
+    controller.settle_all(tuple(SHOWN.items()))
+    controller.set_layout(Layout.MATRIX)
+
+
+SCENES = {"point": _pin_three_places, "support": _go_where_nobody_is, "matrix": _lay_out}
 """The pictures of the user guide, by name; each scene starts where the one before it ended."""
 
 

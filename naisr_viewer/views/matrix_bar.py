@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import QSignalBlocker, QSize, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QComboBox, QHBoxLayout, QLabel, QSizePolicy, QSpinBox, QWidget
+from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QLabel, QSizePolicy, QSpinBox, QWidget
 
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.matrix import (
@@ -17,9 +17,10 @@ from naisr_viewer.state.matrix import (
     with_count,
     with_covariate,
 )
+from naisr_viewer.views.patients.pieces import ChoiceBox
 from naisr_viewer.words.titles import label
 
-NAME_PX, LEAST_NAME_PX = 110, 40
+NAME_PX, LEAST_NAME_PX = 130, 40
 """Width of a name, and what is left of it in a small window."""
 
 
@@ -39,12 +40,13 @@ class SideBox(QWidget):
     def __init__(self, axis: Axis, title: str, most: int, parent: QWidget) -> None:
         super().__init__(parent)
         self.axis = axis
-        self.names = QComboBox(self)
+        plain = title.replace("&", "")
+        self.names = ChoiceBox(plain, f"What changes along the {plain.lower()}", self)
         self.names.setMinimumWidth(LEAST_NAME_PX)
         self.names.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.count = QSpinBox(self)
         self.count.setRange(LEAST_STEPS, most)
-        self.count.setAccessibleName(f"Values along the {title.replace('&', '').lower()}")
+        self.count.setAccessibleName(f"Values along the {plain.lower()}")
         self.count.setToolTip("How many values of it; the first row and column are of one covariate alone")
         self.title = QLabel(title, self)
         self.title.setBuddy(self.names)
@@ -59,13 +61,9 @@ class SideBox(QWidget):
 
     def show_side(self, side: Side, atlas: AtlasCard) -> None:
         """Show what the side is, telling nobody."""
-        names = [covariate.name for covariate in atlas.covariates]
-        with QSignalBlocker(self.names), QSignalBlocker(self.count):
-            if [self.names.itemData(index) for index in range(self.names.count())] != names:
-                self.names.clear()
-                for name in names:
-                    self.names.addItem(label(name), name)
-            self.names.setCurrentIndex(names.index(side.covariate))
+        choices = [(covariate.name, label(covariate.name)) for covariate in atlas.covariates]
+        self.names.show_choices(choices, side.covariate)
+        with QSignalBlocker(self.count):
             self.count.setValue(len(side.values))
         self.count.setEnabled(atlas.covariates[atlas.index(side.covariate)].kind == "continuous")
 

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QColor
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QDialog, QLabel
 
+from naisr_model.progress import Progress
+from naisr_viewer.control import jobs
 from naisr_viewer.files.sessions import read_session
-from naisr_viewer.panels.kinds import visible_panels
+from naisr_viewer.panels.kinds import missing, visible_panels
+from naisr_viewer.panels.matrix import here
 from naisr_viewer.program.headless import finish
+from naisr_viewer.state.explorer import ExplorerState, opened
 from naisr_viewer.state.layouts import Layout
 from naisr_viewer.views.dialogs.export import ExportDialog
 from naisr_viewer.views.matrix_bar import MatrixBar
@@ -67,6 +73,15 @@ def test_a_click_on_a_cell_takes_its_covariates_as_one_step(ready, qtbot):
     (volume,) = [label for label in captions if label.geometry().contains(place)]
     QTest.mouseClick(volume, LEFT, pos=QPoint(5, 5))
     assert controller.state.values == (matrix.across.values[3], matrix.down.values[2], 0.0)
+
+
+def test_what_is_nearest_comes_first_and_not_all_of_it_is_waited_for(engine, card):
+    state = replace(opened(ExplorerState(), card), layout=Layout.MATRIX)
+    wanted = missing(state, {}, 40)
+    groups: list[jobs.Surfaces] = []
+    jobs.frame(engine, wanted)(groups.append, Progress())
+    assert [surface.request for group in groups for surface in group] == wanted
+    assert len(groups) > 1 and groups[0][0].request.panel == here(state)
 
 
 def test_a_double_click_goes_there(ready, qtbot):
