@@ -80,10 +80,13 @@ def _by_tables(
     values: Named, shape: SurfaceResult, tracker: Tracker, covariate: Covariate | None
 ) -> NDArray[np.float32]:
     """The same of the vertices that were carried, by how far apart they are carried otherwise."""
+    from naisr_model.surface.tracking import Tracked
+
     if covariate is None:
         return _along(shape.points_mm - tracker.track({}).points_mm, shape)
     low, high = _ends(dict(values), covariate)
-    before, after = (tracker.track({**dict(values), covariate.name: end}) for end in (low, high))
+    here = Tracked(shape.points_mm, shape.normals, 0.0, False)  # which is nearly there
+    before, after = (tracker.track({**dict(values), covariate.name: end}, here) for end in (low, high))
     apart = 1.0 if covariate.kind == "binary" else high - low
     return _along((after.points_mm - before.points_mm) / np.float32(apart), shape)
 

@@ -20,7 +20,9 @@ from naisr_viewer.control.controller import Controller
 from naisr_viewer.program import start
 from naisr_viewer.program.display import ensure_display
 from naisr_viewer.program.headless import finish, take_screenshot
+from naisr_viewer.state.explorer import ExplorerState, opened, with_values
 from naisr_viewer.state.layouts import FULL_SHAPE, Layout
+from naisr_viewer.state.overlay import Quantity
 from naisr_viewer.state.patients import Named, Reading
 from naisr_viewer.state.support import Support
 from naisr_viewer.views.main_window import MainWindow
@@ -50,12 +52,14 @@ def main(folder: Path) -> None:
     with TemporaryDirectory() as scans, start.own_window(engine) as (window, controller):
         window.resize(*PIXELS)
         window.show()
-        controller.show_atlas(card, SHOWN)
+        first = with_values(opened(ExplorerState(), card), tuple(SHOWN.items()))
+        controller.begin(first)
         take_screenshot(window, controller, folder / "window.png")
         for name, scene in SCENES.items():
+            controller.begin(first)
             scene(window, controller)
             take_screenshot(window, controller, pictures / f"{name}.png")
-        controller.show_atlas(card, SHOWN)
+        controller.begin(first)
         _fit(window, controller, _child(Path(scans)))
         controller.set_follow(True)
         controller.set_layout(Layout.CHANGE)
@@ -74,22 +78,29 @@ def _pin_three_places(window: MainWindow, controller: Controller) -> None:
         finish(window, controller)
 
 
-def _go_where_nobody_is(window: MainWindow, controller: Controller) -> None:
+def _go_where_nobody_is(_window: MainWindow, controller: Controller) -> None:
     """Among the people behind the atlas: as heavy as hardly anyone of that age."""
-    window.unpin_requested.emit()
     controller.set_support(Support("age", "weight", is_open=True))
     controller.settle_all(HARDLY_ANYONE)
 
 
-def _lay_out(window: MainWindow, controller: Controller) -> None:
-    """By age and weight, nearest to a child of five."""
-    controller.set_support(Support("age", "weight"))
-    controller.settle_all(tuple(SHOWN.items()))
+def _show_maps(_window: MainWindow, controller: Controller) -> None:
+    """How far each point has moved."""
+    controller.set_quantity(Quantity.DISPLACEMENT)
+
+
+def _lay_out(_window: MainWindow, controller: Controller) -> None:
+    """By age and weight."""
     controller.set_layout(Layout.MATRIX)
 
 
-SCENES = {"point": _pin_three_places, "support": _go_where_nobody_is, "matrix": _lay_out}
-"""The pictures of the user guide, by name; each scene starts where the one before it ended."""
+SCENES = {
+    "point": _pin_three_places,
+    "support": _go_where_nobody_is,
+    "maps": _show_maps,
+    "matrix": _lay_out,
+}
+"""The pictures of the user guide, by name; each scene starts from what ``window.png`` shows."""
 
 
 def _child(folder: Path) -> Child:

@@ -10,7 +10,9 @@ from naisr_viewer.views.elided import ElidedCheckBox, ElidedLabel
 from naisr_viewer.words.maps import HINTS, SHARED, SHARED_HINT, TITLES
 from naisr_viewer.words.titles import as_tip
 
-LEAST_PX = 32
+LEAST_PX, SHARED_PX = 32, 110
+FIRST = 100
+"""How much more room one of two gets, until it has all that it needs."""
 
 
 class MapBar(QFrame):
@@ -25,6 +27,7 @@ class MapBar(QFrame):
         self.buttons = {quantity: self._button(quantity) for quantity in Quantity}
         self._shown = Quantity.PLAIN
         self.shared = ElidedCheckBox(SHARED, SHARED_HINT, self)
+        self.shared.setMaximumWidth(SHARED_PX)
         self.shared.toggled.connect(self.shared_toggled)
         self._told = ElidedLabel("", self)
         self._told.setObjectName("muted")
@@ -35,7 +38,7 @@ class MapBar(QFrame):
             row.addWidget(button, 0, Qt.AlignmentFlag.AlignVCenter)
         row.addSpacing(8)
         row.addWidget(self._told, 1)
-        row.addWidget(self.shared)
+        row.addWidget(self.shared, FIRST)
         self.hide()
 
     @property

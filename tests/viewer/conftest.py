@@ -127,6 +127,28 @@ class EllipsoidAtlas:
     ):
         return self._surface("shape", dict(covariates), resolution, progress)
 
+    def moved_mm(self, points_mm, covariates, latent=None):
+        """Along the normals, since the ellipsoid at the centre."""
+        ratio = np.divide(self.half_axes_mm(**covariates), self.half_axes_mm())
+        return self._along(points_mm, np.asarray(points_mm) * (1 - 1 / ratio), covariates)
+
+    def rates_mm(self, points_mm, name, covariates, latent=None):
+        """A unit of the covariate farther, all else equal."""
+        either = [{**covariates, name: covariates.get(name, 0.0) + side} for side in (-0.5, 0.5)]
+        low, high = (np.array(self.half_axes_mm(**values)) for values in either)
+        moved = np.asarray(points_mm) * (high - low) / self.half_axes_mm(**covariates)
+        return self._along(points_mm, moved, covariates)
+
+    def contrast_mm(self, points_mm, name, covariates, latent=None):
+        low, high = (np.array(self.half_axes_mm(**{**covariates, name: end})) for end in (-1.0, 1.0))
+        moved = np.asarray(points_mm) * (high - low) / self.half_axes_mm(**covariates)
+        return self._along(points_mm, moved, covariates)
+
+    def _along(self, points_mm, moved_mm, covariates):
+        normals = np.asarray(points_mm) / np.square(self.half_axes_mm(**covariates))
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        return np.sum(moved_mm * normals, axis=1).astype(np.float32)
+
     def tabulate(self, template, latent=None, *, progress=SILENT):
         """Nothing needs to be tabulated: the tracker knows the ellipsoids."""
         self.calls.append(("tabulate", {}, 0))
