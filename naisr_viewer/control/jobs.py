@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,13 +13,23 @@ from naisr_viewer.engine.engine import Engine
 from naisr_viewer.engine.ledgers import ledger, origin_mm
 from naisr_viewer.engine.sessions import Restored, completed, restored
 from naisr_viewer.files.exports import Planned
+from naisr_viewer.files.figure import figure_bytes
+from naisr_viewer.files.matrix import MatrixPlan, figure_of, write_matrix
 from naisr_viewer.files.sessions import read_session, write_session
 from naisr_viewer.files.surfaces import require_writable, write_surface
 from naisr_viewer.state.atlas_card import AtlasCard
+from naisr_viewer.state.explorer import ExplorerState
+from naisr_viewer.state.layouts import Panel
 from naisr_viewer.state.patients import Fitted, Labels, Named, Reading, Scan
 from naisr_viewer.state.pins import Ledger, LedgerRequest, Point
 from naisr_viewer.state.requests import ExportChoice, SurfaceRequest, SurfaceResult
 from naisr_viewer.state.session import Session
+
+COMPUTING = 0.7
+"""Of the time that a figure takes."""
+
+AT_ONCE = 6
+"""Previews that are waited for before any is painted."""
 
 Surfaces = tuple[SurfaceResult, ...]
 
@@ -35,6 +45,7 @@ class ExportReport:
     def sentence(self) -> str:
         """What the status line says."""
         surfaces = "1 surface" if self.count == 1 else f"{self.count} surfaces"
+        surfaces = f"a figure and {surfaces}" if self.choice.figure else surfaces
         return f"Exported {surfaces} as {self.choice.format.upper()} to {self.choice.folder}"
 
 
@@ -44,10 +55,15 @@ def opening(engine: Engine, path: Path) -> Job[AtlasCard]:
 
 
 def frame(engine: Engine, requests: Sequence[SurfaceRequest]) -> Job[Surfaces]:
-    """All surfaces of one moment, handed over together so that they are painted together."""
-    return lambda deliver, progress: deliver(
-        tuple(engine.surface(request, progress.quiet) for request in requests)
-    )
+    """All surfaces of one moment, handed over together so that they are painted together; many in groups."""
+
+    def job(deliver: Deliver[Surfaces], progress: Progress) -> None:
+        for start in range(0, len(requests), AT_ONCE):
+            progress.check()
+            group = requests[start : start + AT_ONCE]
+            deliver(tuple(engine.surface(request, progress.quiet) for request in group))
+
+    return job
 
 
 def one_by_one(engine: Engine, requests: Sequence[SurfaceRequest]) -> Job[Surfaces]:
@@ -72,6 +88,23 @@ def exporting(
         for each, surface in zip(plan, surfaces, strict=True):
             write_surface(each.path, surface, atlas, each.owner, each.reference)
         deliver(ExportReport(len(plan), choice))
+
+    return job
+
+
+def exporting_matrix(
+    engine: Engine, state: ExplorerState, plan: MatrixPlan, choice: ExportChoice, colours: Mapping[Panel, str]
+) -> Job[ExportReport]:
+    """Writes the matrix, all files or none; hands over a report on what was chosen."""
+
+    def job(deliver: Deliver[ExportReport], progress: Progress) -> None:
+        computing = progress.part(0.0, COMPUTING).over(plan.cells)
+        surfaces = [engine.surface(each.request, piece) for each, piece in computing]
+        drawing = progress.part(COMPUTING, 1.0)
+        figure = figure_bytes(figure_of(state, choice, surfaces, colours), choice.figure, drawing)
+        progress.check()
+        write_matrix(plan, state, surfaces, figure)
+        deliver(ExportReport(len(plan.cells), choice))
 
     return job
 

@@ -12,7 +12,7 @@ from naisr_model.errors import Cancelled
 from naisr_viewer.control import jobs
 from naisr_viewer.control.worker import Deliver, Job, Worker
 from naisr_viewer.engine.engine import Engine
-from naisr_viewer.panels.kinds import caption_of, missing, request_for, shows, visible_panels
+from naisr_viewer.panels.kinds import caption_of, is_there, missing, request_for, shows, visible_panels
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Panel
 from naisr_viewer.state.requests import EXACT_RESOLUTION, PREVIEW_RESOLUTION, SurfaceRequest, SurfaceResult
@@ -117,10 +117,10 @@ class Refinement(QObject):
         self._worker.close()
 
     def _clear_others(self) -> None:
-        """Take surfaces of somebody else from the screen; an empty view is honest."""
+        """Take surfaces of somebody else, or without a place, from the screen; an empty view is honest."""
         for panel, result in list(self.shown.items()):
-            wanted = request_for(self._state, panel, 0)
-            if wanted.person != result.request.person:
+            is_gone = not is_there(self._state, panel)
+            if is_gone or request_for(self._state, panel, 0).person != result.request.person:
                 del self.shown[panel]
                 self._window.shapes.clear_surface(panel)
 

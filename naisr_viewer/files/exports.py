@@ -15,6 +15,7 @@ from naisr_viewer.panels.kinds import kind_of, request_for, title_of
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Panel
+from naisr_viewer.state.matrix import plain_panel
 from naisr_viewer.state.patients import Named, OpenScan
 from naisr_viewer.state.requests import EXACT_RESOLUTION, ExportChoice, SurfaceRequest
 
@@ -71,11 +72,22 @@ def file_stem(
     Of a change also what it is counted from: ``airway-p01-change_age120_sexM_since_age84_sexM``, and whom
     where that is somebody else.
     """
-    words = "-".join([atlas.name, *_plain_names(owner), title_of(request.panel)]).lower()
+    view = plain_panel(request.values) if request.panel.cell else request.panel
+    words = "-".join([atlas.name, *_plain_names(owner), title_of(view)]).lower()
     parts = [words, *_values(atlas, request.values)]
     if request.before is not None:
         other = reference if reference is not owner else None
         parts += ["-".join(["since", *_plain_names(other)]), *_values(atlas, request.before[1])]
+    return _short("_".join(STRANGE.sub("-", part).strip("-") for part in parts))
+
+
+def matrix_stem(state: ExplorerState) -> str:
+    """The same for all files of the matrix together: ``airway-p01-matrix_age_weight``."""
+    assert state.atlas is not None
+    assert state.matrix is not None
+    owner = state.shown if state.fit else None
+    words = "-".join([state.atlas.name, *_plain_names(owner), "matrix"]).lower()
+    parts = [words, state.matrix.across.covariate, state.matrix.down.covariate]
     return _short("_".join(STRANGE.sub("-", part).strip("-") for part in parts))
 
 

@@ -50,16 +50,21 @@ def write_surface(
     Raises:
         InputError: when there is no surface to write, or the ending or folder will not do.
     """
-    ending = require_writable(path, result)
     beside = record_of(path)
-    content = mesh_bytes(_triangles(result), ending)
-    with replacing(path) as temporary:
-        temporary.write_bytes(content)
+    write_mesh(path, result)
     record = description(result, atlas, path.name, patient, reference)
     text = json.dumps(record, indent=2, ensure_ascii=False) + "\n"
     with replacing(beside) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return path, beside
+
+
+def write_mesh(path: Path, result: SurfaceResult) -> None:
+    """Write a surface alone; otherwise as :func:`write_surface`."""
+    ending = require_writable(path, result)
+    content = mesh_bytes(_triangles(result), ending)
+    with replacing(path) as temporary:
+        temporary.write_bytes(content)
 
 
 def require_writable(path: Path, result: SurfaceResult) -> MeshFormat:

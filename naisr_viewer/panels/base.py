@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState
-from naisr_viewer.state.layouts import Layout, Panel
+from naisr_viewer.state.layouts import Cell, Layout, Panel
 from naisr_viewer.state.overlay import Map
 from naisr_viewer.state.patients import Named
 from naisr_viewer.state.requests import Scale, SurfaceRequest, SurfaceResult
@@ -42,8 +42,10 @@ class PanelKind:
         unit: of those numbers.
         quantity: what they are, in a file; the name of the kind when left out.
         covariates: whose panels there are, one for each name; one of no covariate when left out.
+        cells: of the matrix, for each of which there is one.
         is_possible: whether an atlas can show it.
-        is_asked: whether there is something to show in a situation.
+        is_there: whether a state has a place for a panel of this kind.
+        away: how far a panel is from what is looked at; what is nearer is computed first.
         is_mapped: whether its surface can be coloured by what covariates do to it.
         is_modelled: whether its surface is the shape model's, in which material points can be found.
     """
@@ -59,8 +61,10 @@ class PanelKind:
     unit: str = "mm"
     quantity: str = ""
     covariates: Callable[[AtlasCard], tuple[str, ...]] = lambda _: ("",)
+    cells: tuple[Cell | None, ...] = (None,)
     is_possible: Callable[[AtlasCard], bool] = lambda _: True
-    is_asked: Callable[[ExplorerState], bool] = lambda _: True
+    is_there: Callable[[ExplorerState, Panel], bool] = lambda *_: True
+    away: Callable[[ExplorerState, Panel], float] = lambda *_: 0.0
     is_mapped: bool = False
     is_modelled: bool = True
 
@@ -72,7 +76,7 @@ class PanelKind:
     def panels(self, atlas: AtlasCard) -> tuple[Panel, ...]:
         """All of this kind that an atlas can show."""
         names = self.covariates(atlas) if self.is_possible(atlas) else ()
-        return tuple(Panel(self.name, name) for name in names)
+        return tuple(Panel(self.name, name, cell) for name in names for cell in self.cells)
 
 
 def ask_full_shape(state: ExplorerState, panel: Panel, resolution: int) -> SurfaceRequest:

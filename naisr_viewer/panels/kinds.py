@@ -5,7 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from naisr_viewer.panels import before, change, deviation, effect, scan, scans, shape, template, uncertainty
+from naisr_viewer.panels import (
+    before,
+    change,
+    deviation,
+    effect,
+    matrix,
+    scan,
+    scans,
+    shape,
+    template,
+    uncertainty,
+)
 from naisr_viewer.panels.base import PanelKind
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState
@@ -26,6 +37,7 @@ KINDS: dict[str, PanelKind] = {
         deviation.KIND,
         change.KIND,
         scans.KIND,
+        matrix.KIND,
     )
 }
 """By name. A new kind is one line here and one among the answers of the engine; a script may add its own to
@@ -59,8 +71,8 @@ def panels_in(layout: Layout, atlas: AtlasCard) -> tuple[Panel, ...]:
 
 def layouts_of(atlas: AtlasCard) -> tuple[Layout, ...]:
     """The layouts in which an atlas has more to show than its full shape, and that one."""
-    alone = (FULL_SHAPE,)
-    return tuple(each for each in Layout if each is Layout.FULL_SHAPE or panels_in(each, atlas) != alone)
+    little = ((), (FULL_SHAPE,))
+    return tuple(each for each in Layout if each is Layout.FULL_SHAPE or panels_in(each, atlas) not in little)
 
 
 def with_layout_of(state: ExplorerState) -> ExplorerState:
@@ -72,8 +84,14 @@ def with_layout_of(state: ExplorerState) -> ExplorerState:
 
 def visible_panels(state: ExplorerState) -> tuple[Panel, ...]:
     """The panels of the present layout; none without an atlas."""
-    found = () if state.atlas is None else panels_in(state.layout, state.atlas)
-    return tuple(panel for panel in found if kind_of(panel).is_asked(state))
+    if state.atlas is None:
+        return ()
+    return tuple(panel for panel in panels_in(state.layout, state.atlas) if is_there(state, panel))
+
+
+def is_there(state: ExplorerState, panel: Panel) -> bool:
+    """Whether ``state`` has a place for a panel, in whichever layout."""
+    return kind_of(panel).is_there(state, panel)
 
 
 def request_for(state: ExplorerState, panel: Panel, resolution: int) -> SurfaceRequest:
@@ -91,6 +109,11 @@ def shows(result: SurfaceResult | None, request: SurfaceRequest) -> bool:
 def missing(
     state: ExplorerState, shown: Mapping[Panel, SurfaceResult], resolution: int
 ) -> list[SurfaceRequest]:
-    """What ``state`` wants at ``resolution`` and is not among ``shown`` yet, the full shape first."""
-    wanted = [request_for(state, panel, resolution) for panel in reversed(visible_panels(state))]
+    """What ``state`` wants at ``resolution`` and is not among ``shown`` yet.
+
+    The full shape first, and of the matrix what is nearest to it.
+    """
+    last_first = visible_panels(state)[::-1]
+    panels = sorted(last_first, key=lambda panel: kind_of(panel).away(state, panel))
+    wanted = [request_for(state, panel, resolution) for panel in panels]
     return [request for request in wanted if not shows(shown.get(request.panel), request)]

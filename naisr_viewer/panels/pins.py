@@ -10,20 +10,25 @@ from naisr_viewer.state.pins import LedgerRequest, Shown
 
 def can_pin(state: ExplorerState, panel: Panel) -> bool:
     """Whether a click on a surface means a material point, whose way can be told cause by cause."""
-    return state.atlas is not None and state.atlas.capabilities.trackable and kind_of(panel).is_modelled
+    return state.atlas is not None and state.atlas.capabilities.trackable and _has_pins(panel)
 
 
 def ledger_request(state: ExplorerState) -> LedgerRequest | None:
     """What is to be asked about the pins; None where there are none."""
     if state.atlas is None or not state.pins:
         return None
-    others = [each for each in visible_panels(state) if each != FULL_SHAPE and kind_of(each).is_modelled]
+    others = [each for each in visible_panels(state) if each != FULL_SHAPE and _has_pins(each)]
     return LedgerRequest(
         state.atlas.path,
         state.pins,
         _shown(state, FULL_SHAPE),
         tuple(_shown(state, panel) for panel in others),
     )
+
+
+def _has_pins(panel: Panel) -> bool:
+    """A cell of the matrix is clicked for its covariates, and a fold in one would leave all without pins."""
+    return kind_of(panel).is_modelled and panel.cell is None
 
 
 def _shown(state: ExplorerState, panel: Panel) -> Shown:

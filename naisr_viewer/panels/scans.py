@@ -14,7 +14,7 @@ HINT = (
 )
 
 
-def _is_asked(state: ExplorerState) -> bool:
+def _is_there(state: ExplorerState, _panel: Panel) -> bool:
     """Whether another scan is compared with, and both have a surface."""
     other, shown = state.find(state.compared), state.shown
     if other is None or shown is None or other is shown or not state.can_forecast:
@@ -54,6 +54,6 @@ KIND = PanelKind(
     scale="signed",
     quantity="difference",
     is_modelled=False,
-    is_asked=_is_asked,
+    is_there=_is_there,
     is_possible=lambda atlas: atlas.capabilities.trackable,  # as the change beside it
 )

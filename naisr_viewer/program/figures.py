@@ -97,7 +97,17 @@ def _show_maps(_window: MainWindow, controller: Controller) -> None:
     controller.set_quantity(Quantity.DISPLACEMENT)
 
 
-SCENES = {"point": _pin_three_places, "support": _go_where_nobody_is, "maps": _show_maps}
+def _lay_out(_window: MainWindow, controller: Controller) -> None:
+    """By age and weight."""
+    controller.set_layout(Layout.MATRIX)
+
+
+SCENES = {
+    "point": _pin_three_places,
+    "support": _go_where_nobody_is,
+    "maps": _show_maps,
+    "matrix": _lay_out,
+}
 """The pictures of the user guide, by name; each scene starts from what ``window.png`` shows."""
 
 

@@ -112,6 +112,7 @@ def make_window(
     from naisr_viewer.control.atlas_watch import AtlasWatch
     from naisr_viewer.control.controller import Controller
     from naisr_viewer.control.desk import PatientDesk
+    from naisr_viewer.control.matrix import MatrixDesk
     from naisr_viewer.control.pinning import PinDesk
     from naisr_viewer.control.preferences import Preferences
     from naisr_viewer.control.sessions import SessionDesk
@@ -130,6 +131,7 @@ def make_window(
     AtlasWatch(controller)  # and this
     PinDesk(window, controller, engine, Worker(), Worker())  # and this
     SessionDesk(window, controller, engine, clinic, Worker(), Worker(), kept)  # and this
+    MatrixDesk(window, controller, engine)  # and this
     return window, controller
 
 

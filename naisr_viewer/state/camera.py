@@ -24,3 +24,6 @@ class Camera:
     up: Triple
     framed_mm: tuple[float, float]
     zoom: float = 1.0
+
+
+FROM_THE_FRONT = Camera((0.0, -1.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0))

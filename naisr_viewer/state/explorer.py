@@ -9,7 +9,8 @@ import numpy as np
 from naisr_model.covariates import growth_path
 from naisr_viewer.state.atlas_card import AtlasCard, RealVector
 from naisr_viewer.state.drawer import Tab, tabs_of
-from naisr_viewer.state.layouts import Layout
+from naisr_viewer.state.layouts import Cell, Layout
+from naisr_viewer.state.matrix import Matrix, first_matrix, values_at
 from naisr_viewer.state.overlay import NOTHING_SHOWN, Overlay
 from naisr_viewer.state.patients import Fitted, Named, OpenScan
 from naisr_viewer.state.pins import Pin, Point, with_pin
@@ -30,6 +31,7 @@ class ExplorerState:
         compared: key of the one that is compared with; None for the patient as fitted.
         has_ghost: whether the scan is drawn over the full shape.
         pins: places that are marked in all shapes, and told of.
+        matrix: what shapes are laid out by in that layout; None where there are no two covariates.
         overlay: what the surfaces are coloured by.
         touched: the covariate that was moved last; empty before.
         drawer: the page that is open beneath the shapes; None where it is closed.
@@ -46,6 +48,7 @@ class ExplorerState:
     compared: int | None = None
     has_ghost: bool = True
     pins: tuple[Pin, ...] = ()
+    matrix: Matrix | None = None
     overlay: Overlay = NOTHING_SHOWN
     touched: str = ""
     drawer: Tab | None = None
@@ -116,6 +119,7 @@ def opened(state: ExplorerState, atlas: AtlasCard) -> ExplorerState:
         layout,
         follow=state.follow,
         has_ghost=state.has_ghost,
+        matrix=first_matrix(atlas),
         drawer=drawer,
         support=suited(state.support, atlas),
     )
@@ -161,6 +165,13 @@ def reset(state: ExplorerState, name: str) -> ExplorerState:
 def reset_all(state: ExplorerState) -> ExplorerState:
     """Every covariate back home."""
     return replace(state, values=state.home)
+
+
+def at_cell(state: ExplorerState, cell: Cell) -> ExplorerState:
+    """The covariates of a cell of the matrix."""
+    assert state.atlas is not None
+    assert state.matrix is not None
+    return replace(state, values=values_at(state.atlas, state.matrix, cell, state.values))
 
 
 def with_patient(state: ExplorerState, patient: OpenScan) -> ExplorerState:

@@ -13,6 +13,7 @@ class Layout(StrEnum):
     FULL_SHAPE = "full shape"
     FIT = "fit"
     CHANGE = "before and after"
+    MATRIX = "matrix"
 
     @property
     def needs_fit(self) -> bool:
@@ -25,12 +26,23 @@ class Layout(StrEnum):
         return self is Layout.CHANGE
 
 
+Cell = tuple[int, int]
+"""Column and row in the matrix; 0 is where an axis stands."""
+
+
 @dataclass(frozen=True)
 class Panel:
-    """One sub-plot: what ``kind`` of view it is, and of which covariate where the kind is about one."""
+    """One sub-plot.
+
+    Attributes:
+        kind: what kind of view it is.
+        covariate: which one, where the kind is about one.
+        cell: which one of the matrix, where the kind is laid out in cells.
+    """
 
     kind: str
     covariate: str = ""
+    cell: Cell | None = None
 
 
 TEMPLATE = Panel("template")

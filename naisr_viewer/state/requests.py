@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from naisr_viewer.state.camera import FROM_THE_FRONT, Camera
 from naisr_viewer.state.layouts import Panel
 from naisr_viewer.state.overlay import Map
 from naisr_viewer.state.patients import Named
@@ -120,9 +121,14 @@ class ExportChoice:
         format: one of :data:`~naisr_model.exports.FORMATS`.
         resolution: cells along a side of the box.
         folder: made when it is missing.
+        figure: ``pdf`` or ``svg`` where the panels are the matrix, whose files have a folder of their own in
+            that folder; empty for surfaces alone.
+        camera: from where a figure is seen.
     """
 
     panels: tuple[Panel, ...]
     format: str
     resolution: int
     folder: Path
+    figure: str = ""
+    camera: Camera = FROM_THE_FRONT

@@ -12,6 +12,7 @@ from naisr_viewer.views.empty_page import EmptyPage
 from naisr_viewer.views.error_bar import ErrorBar
 from naisr_viewer.views.ledger import LedgerPage
 from naisr_viewer.views.map_bar import MapBar
+from naisr_viewer.views.matrix_bar import MatrixBar
 
 FULL_WIDTH_PX = 540
 """A narrower window takes from the panels as well as from the shapes."""
@@ -31,6 +32,7 @@ class Centre(QWidget):
         self.changed = ChangedBar(self)
         self.empty = EmptyPage(self)
         self.maps = MapBar(self)
+        self.matrix = MatrixBar(self)
         self.ledger = LedgerPage(self)
         self.drawer = Drawer({Tab.POINT: self.ledger}, self)
         self._shapes = shapes
@@ -42,6 +44,7 @@ class Centre(QWidget):
         column.addWidget(self.changed)
         column.addWidget(self.empty, 1)
         column.addWidget(self.maps)
+        column.addWidget(self.matrix)
         column.addWidget(shapes, 1)
         column.addWidget(self.drawer)
         self.show_shapes(False)
@@ -53,7 +56,8 @@ class Centre(QWidget):
     @property
     def stops(self) -> list[QWidget]:
         """What the Tab key goes through, as it is read."""
-        return [*self.errors.stops, *self.changed.stops, self.empty.button, *self.maps.stops]
+        bars = [*self.maps.stops, *self.matrix.stops]
+        return [*self.errors.stops, *self.changed.stops, self.empty.button, *bars]
 
     @property
     def drawer_stops(self) -> list[QWidget]:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from naisr_viewer.panels.kinds import kind_of
+from naisr_viewer.panels.kinds import kind_of, request_for, visible_panels
+from naisr_viewer.panels.matrix import is_pale
 from naisr_viewer.state.atlas_card import AtlasCard
+from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Panel
+from naisr_viewer.state.matrix import plain_panel
 from naisr_viewer.state.requests import Scale
 from naisr_viewer.views.theme import Theme
 
@@ -14,6 +17,10 @@ COVARIATE_COLOURS = ("#e29a3b", "#4fae86", "#c0699f", "#46a9bd", "#d0694f", "#8f
 PIN_COLOURS = ("#d6246e", "#1f6fd6", "#4b2a8c")
 """Of the first, second and third pinned place; told from the shapes and from one another."""
 
+PALENESS = 0.6
+"""Share of the ground in the colour of a surface that is a guess."""
+
+PAPER = "#ffffff"
 PATIENT_COLOURS = ("#d6453d", "#1f9e8c", "#7a5cd0", "#b07d10", "#c2479a", "#5f8a1e")
 """Of the patients that are open, wherever they are points among others; repeated beyond six."""
 
@@ -38,6 +45,30 @@ def covariate_colour(atlas: AtlasCard, name: str) -> str:
 def panel_colour(atlas: AtlasCard, panel: Panel) -> str:
     """The colour of a panel's surface, where its vertices have none of their own."""
     return kind_of(panel).colour or covariate_colour(atlas, panel.covariate)
+
+
+def cell_colours(state: ExplorerState) -> dict[Panel, tuple[str, bool]]:
+    """The colour of each cell of the matrix on screen, that of what it shows, and whether it is pale."""
+    assert state.atlas is not None
+    result = {}
+    for panel in visible_panels(state):
+        shown = plain_panel(request_for(state, panel, 0).values)
+        result[panel] = panel_colour(state.atlas, shown), is_pale(state, panel)
+    return result
+
+
+def printed_colours(state: ExplorerState) -> dict[Panel, str]:
+    """The same on white paper."""
+    return {
+        panel: blend(colour, PAPER, PALENESS if is_faint else 0.0)
+        for panel, (colour, is_faint) in cell_colours(state).items()
+    }
+
+
+def blend(colour: str, other: str, share: float) -> str:
+    """``colour`` (``#rrggbb``) with a share of another one."""
+    pairs = ((int(colour[i : i + 2], 16), int(other[i : i + 2], 16)) for i in (1, 3, 5))
+    return "#" + "".join(f"{round(own + share * (there - own)):02x}" for own, there in pairs)
 
 
 def pin_colour(number: int) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from PySide6.QtCore import QSize, Qt, QTimer, Signal
@@ -12,9 +13,11 @@ from PySide6.QtWidgets import QApplication, QHBoxLayout, QMainWindow, QWidget
 from naisr_model.shipped import shipped
 from naisr_viewer.panels.kinds import visible_panels
 from naisr_viewer.panels.maps import can_map, words_of_maps
+from naisr_viewer.panels.matrix import here
 from naisr_viewer.panels.scales import scale_of
 from naisr_viewer.state.drawer import Tab, tabs_of
 from naisr_viewer.state.explorer import ExplorerState
+from naisr_viewer.state.layouts import Layout
 from naisr_viewer.state.patients import Labels
 from naisr_viewer.state.pins import Ledger
 from naisr_viewer.state.questions import Answer, Question
@@ -31,7 +34,7 @@ from naisr_viewer.views.actions import (
     offer,
 )
 from naisr_viewer.views.centre import Centre
-from naisr_viewer.views.colours import pin_colour
+from naisr_viewer.views.colours import cell_colours, pin_colour
 from naisr_viewer.views.covariates.panel import CovariatePanel
 from naisr_viewer.views.dialogs.about import about
 from naisr_viewer.views.dialogs.documents import DocumentWindow
@@ -58,6 +61,7 @@ from naisr_viewer.views.shapes.shape_view import ShapeView
 from naisr_viewer.views.status_bar import StatusBar
 from naisr_viewer.views.style_sheet import style_sheet
 from naisr_viewer.views.theme import palette, resolved
+from naisr_viewer.words.matrix import heads
 
 TITLE = "NAISR Atlas Explorer"
 FIRST_SIZE = QSize(1280, 800)
@@ -75,14 +79,16 @@ class MainWindow(QMainWindow):
     reading_requested = Signal(
         object
     )  # a Reading: a patient's file and how to read it, from the command line
-    export_requested = Signal(object)  # an ExportChoice from the dialog
     session_requested = Signal(Path)  # a session was chosen or dropped
     session_place_chosen = Signal(Path)  # where the session shall go
     going_on_requested = Signal()  # File > Go on where you left
+    export_requested = Signal(object)  # an ExportChoice from the dialog, of surfaces
+    figure_requested = Signal(object)  # one of the matrix with its figure
     screenshot_requested = Signal(Path)  # where the picture shall go
     undo_requested = Signal()  # Edit > Undo
     redo_requested = Signal()  # Edit > Redo
     layout_requested = Signal(object)  # a Layout from the View menu or the toolbar
+    matrix_requested = Signal(object)  # a Matrix from the boxes above its cells
     quantity_chosen = Signal(object)  # a Quantity that the surfaces shall be coloured by
     shared_toggled = Signal(bool)  # whether all surfaces with numbers of one unit share its scale
     unpin_requested = Signal()  # Edit > Remove pins
@@ -144,7 +150,7 @@ class MainWindow(QMainWindow):
             self._actions["patients"].setChecked(True)
         self.show_sides()
         self._show_maps(state)
-        self.shapes.show_panels(visible_panels(state))
+        self._show_panels(state)
         self._show_ghost(state)
         self._actions[f"layout {state.layout}"].setChecked(True)
         for tab in Tab:
@@ -157,9 +163,22 @@ class MainWindow(QMainWindow):
         self.covariates.setVisible(is_open)
         self.patients.setVisible(is_open and self._actions["patients"].isChecked())
 
+    def _show_panels(self, state: ExplorerState) -> None:
+        """The sub-plots of the layout, and what stands around the cells of the matrix."""
+        matrix = state.matrix if state.layout is Layout.MATRIX else None
+        self._centre.matrix.show_matrix(matrix, state.atlas)
+        if matrix is None or state.atlas is None:
+            self.shapes.show_panels(visible_panels(state))
+            self.shapes.outline(None)
+        else:
+            self.shapes.show_panels(visible_panels(state), heads(state.atlas, matrix))
+            self.shapes.show_colours(cell_colours(state))
+            self.shapes.outline(here(state))
+
     def _show_maps(self, state: ExplorerState) -> None:
-        bar = self._centre.maps
-        bar.setVisible(state.atlas is not None and can_map(state.atlas))
+        """What the surfaces are coloured by; those of the matrix are plain."""
+        bar, is_matrix = self._centre.maps, state.layout is Layout.MATRIX
+        bar.setVisible(state.atlas is not None and can_map(state.atlas) and not is_matrix)
         bar.show_overlay(state.overlay, words_of_maps(state))
         self.shapes.show_scales({panel: scale_of(state, panel) for panel in visible_panels(state)})
 
@@ -282,7 +301,9 @@ class MainWindow(QMainWindow):
         """Let surfaces be chosen and written."""
         assert self._state.atlas is not None
         choice = ExportDialog(self._state, self).ask()
-        if choice is not None:
+        if choice is not None and choice.figure:
+            self.figure_requested.emit(replace(choice, camera=self.shapes.camera or choice.camera))
+        elif choice is not None:
             self.export_requested.emit(choice)
 
     def ask_session(self) -> None:
@@ -372,6 +393,7 @@ class MainWindow(QMainWindow):
         self._centre.maps.quantity_chosen.connect(self.quantity_chosen)
         self._centre.maps.shared_toggled.connect(self.shared_toggled)
         self._centre.drawer.tab_requested.connect(self.drawer_requested)
+        self._centre.matrix.changed.connect(self.matrix_requested)
         self.patients.open_requested.connect(self.ask_scan)
         self.cancel.clicked.connect(self.cancel_requested)
         self.shapes.scale_changed.connect(self.scale.set_scale)

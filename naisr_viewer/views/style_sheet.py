@@ -107,7 +107,9 @@ def style_sheet(theme: Theme) -> str:
     #panelTitle {{ font-weight: 600; color: {t.text}; }}
     #caption {{ color: {t.text}; }}
     #separator {{ background: {t.line}; }}
-    #canvasArea {{ background: {t.canvas}; }}
+    #canvasArea, #heads {{ background: {t.canvas}; }}
+    #heads {{ color: {t.text}; }}
+    #outline {{ border: 2px solid {t.accent}; }}
     #dropZone {{ border: 2px dashed {t.line}; border-radius: 14px; }}
     #emptyTitle {{ font-size: 18pt; font-weight: 600; }}
     #errorBar {{ background: {t.error}; }}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import NamedTuple
 
 import numpy as np
@@ -45,9 +46,19 @@ LATER = (
 )
 
 
+def lines_of(caption: Caption) -> tuple[str, ...]:
+    """What stands beneath a surface, as plain lines."""
+    return tuple(re.sub(r"<[^>]+>", "", line) for line in caption.text.split("<br>"))
+
+
 def large(text: str) -> str:
     """The figure that is read first."""
     return f'<span style="font-size:12pt">{text}</span>'
+
+
+def small(text: str) -> str:
+    """Words that have little room."""
+    return f'<span style="font-size:8pt">{text}</span>' if text else ""
 
 
 def beyond(colouring: Colouring) -> str:

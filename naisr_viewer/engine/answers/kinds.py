@@ -2,7 +2,17 @@
 
 from __future__ import annotations
 
-from naisr_viewer.engine.answers import change, deviation, effect, scan, scans, shape, template, uncertainty
+from naisr_viewer.engine.answers import (
+    change,
+    deviation,
+    effect,
+    matrix,
+    scan,
+    scans,
+    shape,
+    template,
+    uncertainty,
+)
 from naisr_viewer.engine.answers.base import Answer
 
 ANSWERS: dict[str, Answer] = {
@@ -15,5 +25,6 @@ ANSWERS: dict[str, Answer] = {
     "deviation": deviation.ANSWER,
     "change": change.ANSWER,
     "scans": scans.ANSWER,
+    "matrix": matrix.ANSWER,
 }
 """One line a kind, as among the panels."""

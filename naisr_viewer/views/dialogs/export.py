@@ -24,6 +24,8 @@ from naisr_viewer.state.layouts import Layout, Panel
 from naisr_viewer.state.requests import EXACT_RESOLUTION, ExportChoice
 from naisr_viewer.views.dialogs.pieces import buttons_of, column_in, enable_accept
 
+FIGURES = ("pdf", "svg")
+
 RESOLUTIONS = (64, EXACT_RESOLUTION, 192, 256)
 
 
@@ -47,11 +49,14 @@ class ExportDialog(QDialog):
         self.setWindowTitle("Export surfaces")
         self.setMinimumWidth(460)
         on_screen = visible_panels(state)
+        is_matrix = state.layout is Layout.MATRIX
+        singly = () if is_matrix else on_screen
         others = [each for each in panels_in(Layout.SIDE_BY_SIDE, state.atlas) if each not in on_screen]
         self.what = QComboBox(self)
-        self.what.addItem("All views on screen", on_screen)
-        for panel in (*reversed(on_screen), *reversed(others)):
+        self.what.addItem("The matrix, with its figure" if is_matrix else "All views on screen", on_screen)
+        for panel in (*reversed(singly), *reversed(others)):
             self.what.addItem(title_of(panel), (panel,))
+        self.figure: QComboBox | None = QComboBox(self) if is_matrix else None
         self.format = QComboBox(self)
         self.format.addItems([name.upper() for name in FORMATS])
         self.detail = QComboBox(self)
@@ -66,7 +71,10 @@ class ExportDialog(QDialog):
         """What the dialog says now."""
         panels: tuple[Panel, ...] = tuple(self.what.currentData())
         folder = Path(os.path.expanduser(self.folder.text().strip())).absolute()
-        return ExportChoice(panels, self.format.currentText().lower(), self.detail.currentData(), folder)
+        figure = self.figure.currentText().lower() if self.figure and self.what.currentIndex() == 0 else ""
+        return ExportChoice(
+            panels, self.format.currentText().lower(), self.detail.currentData(), folder, figure
+        )
 
     def ask(self) -> ExportChoice | None:
         """Show the dialog; None when it was cancelled."""
@@ -80,6 +88,10 @@ class ExportDialog(QDialog):
         where.addWidget(browse)
         form = QFormLayout()
         form.addRow("&Surfaces", self.what)
+        if self.figure is not None:
+            self.figure.addItems([name.upper() for name in FIGURES])
+            form.addRow("F&igure", self.figure)
+            self.what.currentIndexChanged.connect(lambda index: form.setRowVisible(1, index == 0))
         form.addRow("&Format", self.format)
         form.addRow("&Detail", self.detail)
         label = QLabel("F&older", self)

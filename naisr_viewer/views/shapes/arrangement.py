@@ -7,21 +7,38 @@ from typing import NamedTuple
 
 from PySide6.QtCore import QRect, QSize
 
-TITLE_PX = 36
-CAPTION_PX = 52
-"""Strips above and beneath each shape, where words lie over whatever grows into them."""
-
 LEAST_WIDTH_PX = 150
 """Of a panel; captions are hardly wider."""
 
-LEAST_SHAPE_PX = 80
-"""Height of a shape; rows that would leave less are scrolled to."""
-
-ROOM = 1.25
-"""A shape is framed with this much room, so that it can grow while a slider moves."""
-
 Viewport = tuple[float, float, float, float]
 """Left, bottom, right and top as shares of the canvas, counted from its lower left corner."""
+
+
+class Strips(NamedTuple):
+    """How the height of a panel is shared (px); words lie over whatever of a shape grows into theirs.
+
+    Attributes:
+        title: above the shape.
+        bar: beneath it, for a colour bar.
+        caption: beneath that.
+        least_shape: of a shape; rows that would leave less are scrolled to.
+        room: a shape is framed with so many times its size, so that it can grow while a slider moves.
+    """
+
+    title: int = 36
+    bar: int = 0
+    caption: int = 52
+    least_shape: int = 80
+    room: float = 1.25
+
+    @property
+    def words(self) -> int:
+        """All but the shape."""
+        return self.title + self.bar + self.caption
+
+
+CELL_STRIPS = Strips(title=0, caption=34, least_shape=56, room=1.1)
+"""Of a cell of the matrix, which is named at the ends of its column and row and framed with larger ones."""
 
 
 class Rows(NamedTuple):
@@ -38,28 +55,33 @@ class Rows(NamedTuple):
     in_sight: int
 
 
-def rows_for(count: int, canvas: QSize, strip: int, shape_aspect: float) -> Rows:
+def rows_for(count: int, canvas: QSize, strips: Strips, shape_aspect: float) -> Rows:
     """The grid of ``count`` panels in which a shape is drawn largest and captions have their room.
 
     Args:
         count: how many panels.
         canvas: its size (px).
-        strip: pixels beneath every shape for colour bars.
+        strips: what stands above and beneath every shape.
         shape_aspect: width over height of a shape as seen.
     """
-    most = max(1, canvas.height() // (TITLE_PX + CAPTION_PX + strip + LEAST_SHAPE_PX))
 
     def grid(columns: int) -> Rows:
-        rows = -(-count // columns)
-        return Rows(columns, rows, min(rows, most))
+        return rows_of(count, columns, canvas, strips)
 
     def shape_px(rows: Rows) -> float:
-        high = height_left(canvas.height() / rows.in_sight, strip)
+        high = height_left(canvas.height() / rows.in_sight, strips)
         return min(high, canvas.width() / rows.columns / shape_aspect)
 
     wide_enough = [columns for columns in range(1, count + 1) if canvas.width() >= columns * LEAST_WIDTH_PX]
     grids = [grid(columns) for columns in wide_enough or [1]]
     return max(grids, key=lambda rows: (rows.in_sight - rows.total, round(shape_px(rows), 6), -rows.columns))
+
+
+def rows_of(count: int, columns: int, canvas: QSize, strips: Strips) -> Rows:
+    """The rows of ``count`` panels where so many are beside each other."""
+    rows = -(-count // columns)
+    most = max(1, canvas.height() // (strips.words + strips.least_shape))
+    return Rows(columns, rows, min(rows, most))
 
 
 def cells(count: int, columns: int) -> list[tuple[float, float, float, float]]:
@@ -97,19 +119,19 @@ def _pixels_of(
     return areas
 
 
-def drawn_height(area: QRect, strip: int) -> int:
+def drawn_height(area: QRect, strips: Strips) -> int:
     """Pixels left for the shape between the title and what stands beneath it.
 
     Args:
         area: where the panel is (px).
-        strip: pixels beneath every shape for colour bars.
+        strips: what stands above and beneath every shape.
     """
-    return round(height_left(area.height(), strip))
+    return round(height_left(area.height(), strips))
 
 
-def height_left(height: float, strip: int) -> float:
+def height_left(height: float, strips: Strips) -> float:
     """What title, caption and colour bars leave of a panel's height (px), and never less than a third."""
-    return max(height - TITLE_PX - CAPTION_PX - strip, height / 3, 1)
+    return max(height - strips.words, height / 3, 1)
 
 
 def viewport(area: QRect, canvas: QSize) -> Viewport:
@@ -119,16 +141,16 @@ def viewport(area: QRect, canvas: QSize) -> Viewport:
     return left, 1 - bottom, right, 1 - top
 
 
-def eye_level(area: QRect, strip: int) -> float:
+def eye_level(area: QRect, strips: Strips) -> float:
     """How far the middle between title and caption is above that of the panel, in halves of its height."""
-    above = (CAPTION_PX + strip - TITLE_PX) / max(area.height(), 1)
-    return min(above, 1 - drawn_height(area, strip) / max(area.height(), 1))
+    above = (strips.caption + strips.bar - strips.title) / max(area.height(), 1)
+    return min(above, 1 - drawn_height(area, strips) / max(area.height(), 1))
 
 
-def scale_to_fit(area: QRect, strip: int, wide_mm: float, high_mm: float) -> float:
+def scale_to_fit(area: QRect, strips: Strips, wide_mm: float, high_mm: float) -> float:
     """Millimetres from the middle to the top of a panel between whose words a box so wide and high fits."""
-    drawn_px = drawn_height(area, strip)
-    return ROOM * max(high_mm / drawn_px, wide_mm / area.width()) * area.height() / 2
+    drawn_px = drawn_height(area, strips)
+    return strips.room * max(high_mm / drawn_px, wide_mm / area.width()) * area.height() / 2
 
 
 def separators(areas: Sequence[QRect]) -> set[tuple[int, int, int, int]]:

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QWidget
 from pyvistaqt import QtInteractor
 
 from naisr_viewer.state.requests import SurfaceResult
+from naisr_viewer.views.colours import PALENESS, blend
 from naisr_viewer.views.shapes.arrangement import Viewport
 from naisr_viewer.views.shapes.camera import Direction, aim, is_any_seen, seen_size
 from naisr_viewer.views.shapes.looks import POINT_PX, as_ghost, as_marks
@@ -37,10 +38,12 @@ class Canvas(QtInteractor):
 
     drawn = Signal(int)  # the picture is on its way to the screen; how many sub-plots were drawn anew
     clicked = Signal(int, object)  # a short click: which sub-plot, and the point (mm) of its surface there
+    chosen = Signal(int)  # a short click on a sub-plot, beside its surface too
+    opened = Signal(int)  # a double click on a sub-plot, after that
 
     def __init__(self, colours: Sequence[str], parent: QWidget) -> None:
         self._plots: list[SubPlot] = []
-        self._ghost_colour = "#000000"
+        self._ghost_colour, self._ground = "#000000", "#ffffff"
         self._is_moving = self._is_held = False
         self._pressed: QPoint | None = None
         super().__init__(
@@ -100,6 +103,14 @@ class Canvas(QtInteractor):
         plot.is_stale = True
         self.update()
 
+    def set_colour(self, index: int, colour: str, is_pale: bool) -> None:
+        """Colour a surface whose vertices have no colours (``#rrggbb``), much like the ground where pale."""
+        plot = self._plots[index]
+        if (plot.colour, plot.is_pale) != (colour, is_pale):
+            plot.colour, plot.is_pale = colour, is_pale
+            self._paint(plot)
+            self.update()
+
     def box_mm(self) -> NDArray[np.float64] | None:
         """Bounds of all that is shown, ``[3, 2]``; None where there is nothing."""
         boxes = [box for plot in self._plots if plot.is_shown for box in plot.boxes]
@@ -109,8 +120,9 @@ class Canvas(QtInteractor):
 
     def set_colours(self, background: str, ghost: str) -> None:
         """Colour what is behind the surfaces and what lies over them (``#rrggbb``)."""
-        self._ghost_colour = ghost
+        self._ghost_colour, self._ground = ghost, background
         for plot in self._plots:
+            self._paint(plot)
             plot.renderer.set_background(background)
             if plot.ghost is not None:
                 plot.ghost.prop.color = ghost
@@ -204,6 +216,14 @@ class Canvas(QtInteractor):
         if pressed is not None and (place.toPoint() - pressed).manhattanLength() < CLICK_PX:
             self._pick(place)
 
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        """Tell it; what follows is no further click."""
+        super().mouseDoubleClickEvent(event)
+        self._pressed = None
+        if event.button() is Qt.MouseButton.LeftButton:
+            for index, _ in self._plots_at(event.position()):
+                self.opened.emit(index)
+
     def release(self) -> None:
         """Close the render window for good; nothing is drawn afterwards."""
         self.iren.interactor.RemoveObserver(self._requests)
@@ -212,14 +232,31 @@ class Canvas(QtInteractor):
         self.deleteLater()
 
     def _pick(self, place: QPointF) -> None:
-        """Tell what was clicked, where there is a surface."""
+        """Tell what was clicked."""
+        for index, plot in self._plots_at(place):
+            point_mm = picked(plot, *self._from_below(place))
+            if point_mm is not None:
+                self.clicked.emit(index, point_mm)
+            self.chosen.emit(index)
+
+    def _plots_at(self, place: QPointF) -> list[tuple[int, SubPlot]]:
+        """The sub-plot there, with its number, if any."""
+        x, y = self._from_below(place)
+        return [
+            (index, plot)
+            for index, plot in enumerate(self._plots)
+            if plot.is_shown and plot.renderer.IsInViewport(round(x), round(y))
+        ]
+
+    def _from_below(self, place: QPointF) -> tuple[float, float]:
+        """A place on the canvas in pixels of the screen, counted from below as VTK does."""
         ratio = self.devicePixelRatioF()
-        x, y = place.x() * ratio, (self.height() - 1 - place.y()) * ratio
-        for index, plot in enumerate(self._plots):
-            if plot.is_shown and plot.renderer.IsInViewport(round(x), round(y)):
-                point_mm = picked(plot, x, y)
-                if point_mm is not None:
-                    self.clicked.emit(index, point_mm)
+        return place.x() * ratio, (self.height() - 1 - place.y()) * ratio
+
+    def _paint(self, plot: SubPlot) -> None:
+        """In the colour of a sub-plot."""
+        plot.actor.prop.color = blend(plot.colour, self._ground, PALENESS if plot.is_pale else 0.0)
+        plot.is_stale = True
 
     def _aspect(self, plot: SubPlot) -> float:
         """Width over height of a sub-plot."""
@@ -247,7 +284,7 @@ class Canvas(QtInteractor):
         actor = self.add_actor(pv.Actor(mapper=pv.DataSetMapper(mesh)), render=False)[0]
         actor.prop.color, actor.prop.interpolation = colour, "Phong"
         actor.prop.point_size, actor.prop.render_points_as_spheres = POINT_PX, True
-        plot = SubPlot(self.renderers[index], actor, mesh)
+        plot = SubPlot(self.renderers[index], actor, mesh, colour)
         plot.renderer.SetUseOIT(False)  # a ghost is one layer: nothing to sort, which would cost time
         set_colouring(plot, None)
         return plot

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from PySide6.QtCore import QRect, QRectF, Qt
@@ -16,16 +16,28 @@ from naisr_viewer.state.layouts import Panel
 from naisr_viewer.state.requests import Colouring, SurfaceResult
 from naisr_viewer.views.colours import panel_colour
 from naisr_viewer.views.elided import ElidedLabel
-from naisr_viewer.views.shapes.arrangement import CAPTION_PX, TITLE_PX
+from naisr_viewer.views.shapes.arrangement import CELL_STRIPS, Strips
 from naisr_viewer.views.shapes.colour_bar import WIDTH_PX, ColourBar
+from naisr_viewer.words.captions import small
 
 MARGIN_PX = 10
 DOT_PX = 10
 
+ROOMY_PX = 116
+"""A caption that is narrower has small letters; four words in usual ones are hardly wider."""
 
-def strip_height(cells: Iterable[Cell]) -> int:
-    """Pixels beneath every shape for colour bars; none where no cell has one."""
-    return max((cell.bar.sizeHint().height() for cell in cells if cell.bar and cell.scale), default=0)
+
+def strips_of(cells: Mapping[Panel, Cell]) -> Strips:
+    """What stands around every shape; colour bars only where one has its colours explained."""
+    if columns_of(cells):
+        return CELL_STRIPS
+    bars = (cell.bar.sizeHint().height() for cell in cells.values() if cell.bar and cell.scale)
+    return Strips(bar=max(bars, default=0))
+
+
+def columns_of(panels: Iterable[Panel]) -> int:
+    """How many sub-plots stand in a row, where they are cells of the matrix; 0 where they are not."""
+    return max((panel.cell[0] + 1 for panel in panels if panel.cell is not None), default=0)
 
 
 class Title(ElidedLabel):
@@ -62,6 +74,7 @@ class Cell:
         title: what stands above.
         caption: the label beneath.
         bar: what its colours stand for; None where it never has any.
+        words: what the caption says.
         scale: of its colours; None where it has none now.
         result: the surface, or None as long as there is none.
     """
@@ -69,6 +82,7 @@ class Cell:
     title: Title
     caption: QLabel
     bar: ColourBar | None
+    words: str = ""
     scale: PanelScale | None = None
     result: SurfaceResult | None = None
 
@@ -101,7 +115,7 @@ class Cell:
     def show(self, is_seen: bool) -> None:
         """Show all that stands around the shape, or hide it."""
         for widget in self.widgets:
-            widget.setVisible(is_seen)
+            widget.setVisible(is_seen and widget.height() > 0)
             widget.raise_()
         if self.bar is not None:
             self.bar.setVisible(is_seen and self.scale is not None)
@@ -113,19 +127,20 @@ class Cell:
             if widget is not None:
                 widget.deleteLater()
 
-    def place(self, area: QRect, strip: int) -> None:
+    def place(self, area: QRect, strips: Strips) -> None:
         """The title above the shape; beneath it the colour bar, and the caption under that.
 
         Words that need more lines than usual begin higher up.
         """
-        self.title.setGeometry(area.left(), area.top(), area.width(), TITLE_PX)
-        self.caption.setContentsMargins(0, strip, 0, 0)
-        height = max(CAPTION_PX + strip, self.caption.heightForWidth(area.width()))
-        top = area.top() + max(area.height() - height, TITLE_PX)
+        self.title.setGeometry(area.left(), area.top(), area.width(), strips.title)
+        self.caption.setContentsMargins(0, strips.bar, 0, 0)
+        self.caption.setText(self.words if area.width() >= ROOMY_PX else small(self.words))
+        height = max(strips.caption + strips.bar, self.caption.heightForWidth(area.width()))
+        top = area.top() + max(area.height() - height, strips.title)
         self.caption.setGeometry(area.left(), top, area.width(), area.bottom() + 1 - top)
         if self.bar is not None:
             width = min(WIDTH_PX, area.width())
-            self.bar.setGeometry(area.left() + (area.width() - width) // 2, top, width, strip)
+            self.bar.setGeometry(area.left() + (area.width() - width) // 2, top, width, strips.bar)
 
 
 def make_cell(panel: Panel, atlas: AtlasCard, parent: QWidget) -> Cell:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from PySide6.QtCore import QRect
+from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtWidgets import QFrame, QWidget
 
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.layouts import Panel
-from naisr_viewer.views.shapes.arrangement import separators
+from naisr_viewer.views.shapes.arrangement import Strips, separators
 from naisr_viewer.views.shapes.cell import Cell, make_cell
 
 
@@ -27,8 +27,13 @@ class Grid:
         self._parent = parent
         self._lines: list[QFrame] = []
         self._areas: Mapping[Panel, QRect] = {}
-        self._strip = 0
+        self._strips = Strips()
         self.cells: dict[Panel, Cell] = {}
+        self._outlined: Panel | None = None
+        self._outline = QFrame(parent)
+        self._outline.setObjectName("outline")
+        self._outline.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self._outline.hide()
 
     def fill(self, panels: Sequence[Panel], atlas: AtlasCard) -> None:
         """Make the cells of ``atlas``, still without places."""
@@ -47,27 +52,46 @@ class Grid:
         """Which of the canvas's sub-plots a panel has."""
         return list(self.cells).index(panel)
 
+    def panel(self, index: int) -> Panel:
+        """Whose sub-plot that is."""
+        return list(self.cells)[index]
+
+    def panel_at(self, place: QPoint) -> Panel | None:
+        """Which sub-plot is on screen there, words included."""
+        return next((panel for panel, area in self._areas.items() if area.contains(place)), None)
+
     def say(self, panel: Panel, text: str, hint: str) -> None:
         """The line beneath a sub-plot, and more about it on hover."""
         cell = self.cells[panel]
+        cell.words = text
         cell.caption.setText(text)
         cell.caption.setToolTip(hint)
         if panel in self._areas:
-            cell.place(self._areas[panel], self._strip)
+            cell.place(self._areas[panel], self._strips)
 
-    def place(self, areas: Mapping[Panel, QRect], strip: int) -> None:
+    def place(self, areas: Mapping[Panel, QRect], strips: Strips) -> None:
         """Show the cells that have an area and hide the others.
 
         Args:
             areas: where the panels on screen are (px), words included.
-            strip: pixels beneath every shape for colour bars.
+            strips: what stands above and beneath every shape.
         """
-        self._areas, self._strip = areas, strip
+        self._areas, self._strips = areas, strips
         for panel, cell in self.cells.items():
             if panel in areas:
-                cell.place(areas[panel], strip)
+                cell.place(areas[panel], strips)
             cell.show(panel in areas)
         self._place_lines(list(areas.values()))
+        self.outline(self._outlined)
+
+    def outline(self, panel: Panel | None) -> None:
+        """Draw a line around a sub-plot, and around no other."""
+        self._outlined = panel
+        area = None if panel is None else self._areas.get(panel)
+        if area is not None:
+            self._outline.setGeometry(area)
+            self._outline.raise_()
+        self._outline.setVisible(area is not None)
 
     def show(self) -> None:
         """Show what the cells that have an area have now."""

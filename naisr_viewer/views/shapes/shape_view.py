@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QResizeEvent
+from PySide6.QtCore import QMargins, QSize, Qt, Signal, SignalInstance
+from PySide6.QtGui import QMouseEvent, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
 
 from naisr_viewer.panels.kinds import all_panels
@@ -19,13 +19,24 @@ from naisr_viewer.state.camera import Camera
 from naisr_viewer.state.layouts import FULL_SHAPE, Panel
 from naisr_viewer.state.requests import SurfaceResult
 from naisr_viewer.views.colours import ghost_colour, panel_colour
-from naisr_viewer.views.shapes.arrangement import Rows, areas_for, eye_level, rows_for, scale_to_fit, viewport
+from naisr_viewer.views.shapes.arrangement import (
+    Rows,
+    Strips,
+    areas_for,
+    eye_level,
+    rows_for,
+    rows_of,
+    scale_to_fit,
+    viewport,
+)
 from naisr_viewer.views.shapes.camera import DIRECTIONS, OBLIQUE, Direction
-from naisr_viewer.views.shapes.cell import strip_height
+from naisr_viewer.views.shapes.cell import columns_of, strips_of
 from naisr_viewer.views.shapes.drawing import Drawing, reserve_opengl
 from naisr_viewer.views.shapes.grid import Grid
+from naisr_viewer.views.shapes.heads import MARGINS, HeadBands
 from naisr_viewer.views.shapes.row_scroll import row_scroll, show_rows
 from naisr_viewer.views.theme import LIGHT, Theme
+from naisr_viewer.words.matrix import Heads
 
 if TYPE_CHECKING:
     from naisr_viewer.views.shapes.canvas import Canvas
@@ -35,6 +46,10 @@ NO_FACES = np.zeros((0, 3), np.int64)
 
 Marks = Mapping[Panel, Sequence[tuple[tuple[float, float, float], str]]]
 """Places (mm) and colours (``#rrggbb``) of the dots on each surface."""
+
+
+Colours = Mapping[Panel, tuple[str, bool]]
+"""Of surfaces (``#rrggbb``), and whether they are pale."""
 
 
 class ShapeView(QWidget):
@@ -48,6 +63,8 @@ class ShapeView(QWidget):
     limit_moved = Signal(object, float)  # a Panel, and what the end of its colour scale shall stand for
     fit_requested = Signal(object)  # a Panel whose colour scale shall fit what is shown
     clicked = Signal(object, object)  # a short click on a surface: its Panel, and the point there (mm)
+    chosen = Signal(object)  # a short click on a sub-plot, beside its surface too: its Panel
+    opened = Signal(object)  # a double click on a sub-plot, after that: its Panel
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -67,6 +84,9 @@ class ShapeView(QWidget):
         self._visible: tuple[Panel, ...] = ()
         self._ghost: tuple[NDArray[np.float32] | None, NDArray[np.int64]] = (None, NO_FACES)
         self._marks: Marks = {}
+        self._heads: Heads | None = None
+        self._bands = HeadBands(self)
+        self._colours: Colours = {}
         self._direction = OBLIQUE
         self._framed = self._looked_after = False
         self._moving = False
@@ -105,19 +125,39 @@ class ShapeView(QWidget):
             if cell.bar is not None:
                 cell.bar.limit_moved.connect(lambda limit, panel=panel: self.limit_moved.emit(panel, limit))
                 cell.bar.fit_requested.connect(lambda panel=panel: self.fit_requested.emit(panel))
-        self._ghost, self._marks = (None, NO_FACES), {}
+        self._ghost, self._marks, self._colours = (None, NO_FACES), {}, {}
         self._direction = OBLIQUE
         self._theme = theme
         self._open_canvas()
 
-    def show_panels(self, panels: Sequence[Panel]) -> None:
-        """Put these sub-plots on screen and hide the others."""
+    def show_panels(self, panels: Sequence[Panel], heads: Heads | None = None) -> None:
+        """Put these sub-plots on screen and hide the others.
+
+        Args:
+            panels: which.
+            heads: names of their columns and rows; None where they have their own titles.
+        """
+        before, self._heads = self._heads, heads
         if tuple(panels) != self._visible:
+            self._framed = self._framed and columns_of(panels) == columns_of(self._visible)
             self._visible = tuple(panels)
             self.row_bar.setValue(0)
             self._arrange()
             self._looked_after = False
             self._look_after()
+        elif heads != before:
+            self._arrange()
+
+    def show_colours(self, colours: Colours) -> None:
+        """Colour surfaces otherwise than their kind of view is."""
+        self._colours = colours
+        if self._canvas is not None:
+            for panel, (colour, is_pale) in colours.items():
+                self._canvas.set_colour(self._grid.index(panel), colour, is_pale)
+
+    def outline(self, panel: Panel | None) -> None:
+        """Draw a line around one sub-plot, or around none."""
+        self._grid.outline(panel)
 
     def show_surface(self, result: SurfaceResult) -> None:
         """Replace one surface in place; all that are replaced before Qt paints again share one painting."""
@@ -130,13 +170,13 @@ class ShapeView(QWidget):
 
     def show_scales(self, scales: Mapping[Panel, PanelScale | None]) -> None:
         """Say what the colours of surfaces stand for; those left out have none."""
-        had = strip_height(self._grid.cells[panel] for panel in self._visible)
+        had = self._strips
         for panel, cell in self._grid.cells.items():
             before = cell.scale
             cell.show_scale(scales.get(panel))
             if cell.scale != before and self._canvas is not None:
                 self._paint(panel)
-        if strip_height(self._grid.cells[panel] for panel in self._visible) != had:
+        if self._strips != had:
             self._arrange()
         else:
             self._grid.show()
@@ -228,6 +268,21 @@ class ShapeView(QWidget):
         super().resizeEvent(event)
         self._arrange()
 
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        """A click on words around a shape chooses its sub-plot; words pass it on to here."""
+        super().mouseReleaseEvent(event)
+        self._tell(self.chosen, event)
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        """The same of a double click."""
+        super().mouseDoubleClickEvent(event)
+        self._tell(self.opened, event)
+
+    def _tell(self, signal: SignalInstance, event: QMouseEvent) -> None:
+        panel = self._grid.panel_at(event.position().toPoint())
+        if panel is not None and event.button() is Qt.MouseButton.LeftButton:
+            signal.emit(panel)
+
     def _open_canvas(self) -> None:
         """Start drawing anew, with all that was shown before."""
         self._close_canvas()
@@ -238,6 +293,8 @@ class ShapeView(QWidget):
         self._canvas = make_canvas(colours, self)
         self._canvas.drawn.connect(self._tell_drawn)
         self._canvas.clicked.connect(self._tell_clicked)
+        self._canvas.chosen.connect(lambda index: self.chosen.emit(self._grid.panel(index)))
+        self._canvas.opened.connect(lambda index: self.opened.emit(self._grid.panel(index)))
         self._area.insertWidget(0, self._canvas, 1)
         self._canvas.show()  # the layout would only do so with the next turn of the event loop
         self._canvas.look(*self._direction)
@@ -249,6 +306,7 @@ class ShapeView(QWidget):
         self._canvas.set_ghost(self._grid.index(FULL_SHAPE), *self._ghost)
         for panel in self._marks:
             self._mark(panel)
+        self.show_colours(self._colours)
         self._arrange()
         self._look_after()
 
@@ -265,7 +323,7 @@ class ShapeView(QWidget):
             self._canvas.set_marks(self._grid.index(panel), points_mm, [colour for _, colour in places])
 
     def _tell_clicked(self, index: int, point_mm: tuple[float, float, float]) -> None:
-        self.clicked.emit(list(self._grid.cells)[index], point_mm)
+        self.clicked.emit(self._grid.panel(index), point_mm)
 
     def _close_canvas(self) -> None:
         if self._canvas is not None:
@@ -318,28 +376,51 @@ class ShapeView(QWidget):
         if not self._visible or not self.width() or not self.height():
             return
         wide_mm, high_mm = self._seen_mm
-        strip = strip_height(self._grid.cells[panel] for panel in self._visible)
-        rows, room = self._rows(strip, wide_mm / high_mm)
+        strips = self._strips
+        rows, room = self._rows(strips, wide_mm / high_mm)
         show_rows(self.row_bar, rows)
-        places = areas_for(len(self._visible), room, rows, self.row_bar.value())
-        areas = {panel: area for panel, area in zip(self._visible, places, strict=True) if area is not None}
+        places = areas_for(len(self._visible), self._within(room), rows, self.row_bar.value())
+        areas = {
+            panel: area.translated(self._margins.left(), self._margins.top())
+            for panel, area in zip(self._visible, places, strict=True)
+            if area is not None
+        }
         first = next(iter(areas.values()))
         self._height = first.height()
-        old_fit, self._fit_scale = self._fit_scale, scale_to_fit(first, strip, wide_mm, high_mm)
+        old_fit, self._fit_scale = self._fit_scale, scale_to_fit(first, strips, wide_mm, high_mm)
         if self._canvas is not None:
             self._canvas.camera.parallel_scale *= self._fit_scale / old_fit
-            self._canvas.set_eye_level(eye_level(first, strip))
+            self._canvas.set_eye_level(eye_level(first, strips))
             ports = {panel: viewport(area, room) for panel, area in areas.items()}
             self._canvas.set_viewports([ports.get(panel) for panel in self._grid.cells])
-        self._grid.place(areas, strip)
+        self._grid.place(areas, strips)
+        self._bands.place(self._heads, areas, room)
 
-    def _rows(self, strip: int, aspect: float) -> tuple[Rows, QSize]:
+    def _rows(self, strips: Strips, aspect: float) -> tuple[Rows, QSize]:
         """How the panels are divided, and the room that they have beside a scroll bar where one is needed."""
-        rows = rows_for(len(self._visible), self.size(), strip, aspect)
+        rows = self._divided(self.size(), strips, aspect)
         if rows.in_sight == rows.total:
             return rows, self.size()
         room = QSize(self.width() - self.row_bar.sizeHint().width(), self.height())
-        return rows_for(len(self._visible), room, strip, aspect), room
+        return self._divided(room, strips, aspect), room
+
+    def _divided(self, room: QSize, strips: Strips, aspect: float) -> Rows:
+        count, columns = len(self._visible), columns_of(self._visible)
+        if columns:
+            return rows_of(count, columns, self._within(room), strips)
+        return rows_for(count, self._within(room), strips, aspect)
+
+    def _within(self, room: QSize) -> QSize:
+        """What is left beside the heads."""
+        return room.shrunkBy(self._margins)
+
+    @property
+    def _strips(self) -> Strips:
+        return strips_of({panel: self._grid.cells[panel] for panel in self._visible})
+
+    @property
+    def _margins(self) -> QMargins:
+        return QMargins() if self._heads is None else MARGINS
 
     def _tell_drawn(self, count: int) -> None:
         if self._canvas is not None and self._framed:

@@ -18,9 +18,11 @@ class SubPlot:
         renderer: draws into its part of the canvas.
         actor: the surface's look.
         mesh: the surface as VTK knows it; its contents are replaced in place.
+        colour: of the surface, ``#rrggbb``, where its vertices have none.
         result: what ``mesh`` was made from.
         ghost: the look of what lies over the surface.
         marks: the look of the places that are marked on it.
+        is_pale: whether its colour is much like the ground.
         is_shown: whether it has a part of the canvas.
         is_stale: whether the canvas shows something else.
     """
@@ -28,9 +30,11 @@ class SubPlot:
     renderer: pv.Renderer
     actor: pv.Actor
     mesh: pv.PolyData
+    colour: str
     result: SurfaceResult | None = None
     ghost: pv.Actor | None = None
     marks: pv.Actor | None = None
+    is_pale: bool = False
     is_shown: bool = False
     is_stale: bool = True
 

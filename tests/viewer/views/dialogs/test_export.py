@@ -10,9 +10,9 @@ from PySide6.QtCore import Qt, QTimer
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QFileDialog, QPushButton
 
-from naisr_viewer.panels.kinds import panels_in
+from naisr_viewer.panels.kinds import panels_in, visible_panels
 from naisr_viewer.state.explorer import ExplorerState, opened
-from naisr_viewer.state.layouts import TEMPLATE, Layout, Panel
+from naisr_viewer.state.layouts import FULL_SHAPE, TEMPLATE, Layout, Panel
 from naisr_viewer.state.requests import EXACT_RESOLUTION
 from naisr_viewer.views.dialogs.export import ExportDialog
 
@@ -22,7 +22,7 @@ def state(card) -> ExplorerState:
     return opened(ExplorerState(), card)
 
 
-@pytest.mark.parametrize("layout", Layout)
+@pytest.mark.parametrize("layout", set(Layout) - {Layout.MATRIX})
 def test_all_views_are_proposed_as_they_are_on_screen(qtbot, card, state, layout):
     dialog = ExportDialog(replace(state, layout=layout))
     qtbot.addWidget(dialog)
@@ -34,6 +34,20 @@ def test_all_views_are_proposed_as_they_are_on_screen(qtbot, card, state, layout
     )
     assert choice.resolution == EXACT_RESOLUTION
     assert choice.folder == Path.home()
+
+
+def test_the_matrix_is_proposed_whole_with_a_figure_that_single_views_do_not_have(qtbot, card, state):
+    state = replace(state, layout=Layout.MATRIX)
+    dialog = ExportDialog(state)
+    qtbot.addWidget(dialog)
+    dialog.show()
+    assert dialog.choice().panels == visible_panels(state)
+    assert dialog.figure is not None
+    dialog.figure.setCurrentText("SVG")
+    assert dialog.choice().figure == "svg"
+    dialog.what.setCurrentIndex(1)
+    assert not dialog.figure.isVisible()
+    assert (dialog.choice().panels, dialog.choice().figure) == ((FULL_SHAPE,), "")
 
 
 def test_one_view_is_chosen_with_format_detail_and_folder(qtbot, state, monkeypatch, tmp_path):

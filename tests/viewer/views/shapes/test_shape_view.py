@@ -27,7 +27,7 @@ from naisr_viewer.state.requests import Colouring, SurfaceRequest, SurfaceResult
 from naisr_viewer.views.colours import SCALE_COLOURS
 from naisr_viewer.views.shapes import canvas as cv
 from naisr_viewer.views.shapes import shape_view as sv
-from naisr_viewer.views.shapes.arrangement import CAPTION_PX
+from naisr_viewer.views.shapes.arrangement import Strips
 from naisr_viewer.views.shapes.colour_bar import ColourBar
 from naisr_viewer.views.shapes.drawing import DRAWING
 from naisr_viewer.views.theme import DARK, LIGHT
@@ -518,7 +518,7 @@ def test_a_colour_bar_stands_between_shape_and_caption(views, card):
     place = bar.geometry()
     text_top = below.geometry().top() + below.contentsMargins().top()
     assert shape.stop <= place.top() and place.bottom() < text_top
-    assert views.height() - text_top == CAPTION_PX
+    assert views.height() - text_top == Strips().caption
     assert abs(place.center().x() - views.title(SCAN).geometry().center().x()) <= 1
     plain = caption(views, FULL_SHAPE)
     assert plain.geometry().top() + plain.contentsMargins().top() == text_top
