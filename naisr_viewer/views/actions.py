@@ -330,7 +330,7 @@ MENUS = {
 """What stands in the menu bar, by name."""
 
 TOOLBAR = (
-    "open atlas", "open scan", "export", "screenshot", SEPARATOR,
+    "open atlas", "open scan", "export", SEPARATOR,
     *_names(LAYOUTS), SEPARATOR,
     "undo", "redo", "reset camera",
 )  # fmt: skip
