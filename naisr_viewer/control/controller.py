@@ -34,6 +34,8 @@ from naisr_viewer.state.explorer import (
     opened,
     reset,
     reset_all,
+    with_mute,
+    with_solo,
     with_values,
 )
 from naisr_viewer.state.layouts import Layout, Panel
@@ -225,6 +227,14 @@ class Controller(QObject):
         """Colour the surfaces by something else."""
         self._see(replace(self.state.overlay, quantity=quantity))
 
+    def set_mute(self, name: str, is_muted: bool) -> None:
+        """Leave a covariate out of the full shape, or take it in again."""
+        self.go(with_mute(self.state, name, is_muted))
+
+    def set_solo(self, name: str, is_alone: bool) -> None:
+        """Leave all other covariates out of the full shape, or take all in again."""
+        self.go(with_solo(self.state, name, is_alone))
+
     def set_shared(self, is_shared: bool) -> None:
         """Whether all surfaces with numbers of one unit share its scale."""
         self._see(replace(self.state.overlay, is_shared=is_shared))
@@ -289,6 +299,8 @@ class Controller(QObject):
         window.undo_requested.connect(self.undo)
         window.redo_requested.connect(self.redo)
         window.layout_requested.connect(self.set_layout)
+        window.covariates.mute_toggled.connect(self.set_mute)
+        window.covariates.solo_toggled.connect(self.set_solo)
         window.quantity_chosen.connect(self.set_quantity)
         window.shared_toggled.connect(self.set_shared)
         window.shapes.limit_moved.connect(self.set_limit)

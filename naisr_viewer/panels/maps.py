@@ -28,6 +28,12 @@ def can_map(atlas: AtlasCard) -> bool:
     return atlas.capabilities.trackable and atlas.capabilities.disentangleable and bool(atlas.covariates)
 
 
+def can_mute(atlas: AtlasCard) -> bool:
+    """Whether a covariate can be left out: it moves nothing at its centre, and is not the only one."""
+    capabilities = atlas.capabilities
+    return capabilities.vanishes_at_centre and capabilities.disentangleable and len(atlas.covariates) > 1
+
+
 def map_of(state: ExplorerState, covariate: str = "") -> Map | None:
     """What a surface is coloured by; None where it is plain.
 

@@ -6,6 +6,7 @@ from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import FULL_SHAPE, Layout, Panel
 from naisr_viewer.state.requests import SurfaceRequest, SurfaceResult
 from naisr_viewer.words.captions import LATER, Caption, large
+from naisr_viewer.words.maps import without
 from naisr_viewer.words.numbers import volume
 
 COLOUR = "#6f9fe8"
@@ -18,8 +19,16 @@ def enclosed(result: SurfaceResult) -> Caption:
     return Caption(large(volume(result.volume_cm3, result.volume_margin_cm3)), f"Enclosed volume{within}")
 
 
+_MEASURED = caption_of(enclosed)
+
+
 def _ask(state: ExplorerState, panel: Panel, resolution: int) -> SurfaceRequest:
-    return asked(state, panel, resolution, state.named, state.person, shown=map_of(state))
+    return asked(state, panel, resolution, state.heard, state.person, shown=map_of(state))
+
+
+def _caption(state: ExplorerState, result: SurfaceResult) -> Caption:
+    told = _MEASURED(state, result)
+    return Caption(f"{told.text}<br>{without(state.muted)}", told.hint) if state.muted else told
 
 
 KIND = PanelKind(
@@ -28,7 +37,7 @@ KIND = PanelKind(
     hint="The shape at all covariates together.",
     layouts=frozenset(Layout) - {Layout.MATRIX},
     ask=_ask,
-    caption=caption_of(enclosed),
+    caption=_caption,
     colour=COLOUR,
     is_mapped=True,
 )

@@ -33,6 +33,7 @@ class ExplorerState:
         pins: places that are marked in all shapes, and told of.
         matrix: what shapes are laid out by in that layout; None where there are no two covariates.
         overlay: what the surfaces are coloured by.
+        muted: covariates that are left out of the full shape.
         touched: the covariate that was moved last; empty before.
         drawer: the page that is open beneath the shapes; None where it is closed.
         support: over which covariates the data behind the atlas are shown.
@@ -50,6 +51,7 @@ class ExplorerState:
     pins: tuple[Pin, ...] = ()
     matrix: Matrix | None = None
     overlay: Overlay = NOTHING_SHOWN
+    muted: tuple[str, ...] = ()
     touched: str = ""
     drawer: Tab | None = None
     support: Support = NOTHING_CHOSEN
@@ -59,6 +61,12 @@ class ExplorerState:
     def named(self) -> Named:
         """The covariate values with their names."""
         return self.with_names(self.values)
+
+    @property
+    def heard(self) -> Named:
+        """The same with those that are muted at the population centre, where they move nothing."""
+        centre = dict(self.with_names(self.atlas.centre)) if self.atlas else {}
+        return tuple((name, centre[name] if name in self.muted else value) for name, value in self.named)
 
     @property
     def shown(self) -> OpenScan | None:
@@ -194,6 +202,18 @@ def showing(state: ExplorerState, key: int | None) -> ExplorerState:
     state = with_possible_layout(replace(state, patient=key))
     known = state.shown.known if state.shown and not state.fit else ()
     return with_values(replace(state, values=state.home), known)
+
+
+def with_mute(state: ExplorerState, name: str, is_muted: bool) -> ExplorerState:
+    """One covariate left out of the full shape, or taken in again."""
+    rest = set(state.muted) - {name}
+    return replace(state, muted=tuple(sorted(rest | {name} if is_muted else rest)))
+
+
+def with_solo(state: ExplorerState, name: str, is_alone: bool) -> ExplorerState:
+    """All other covariates left out of the full shape, or all taken in again."""
+    others = {other for other, _ in state.named if other != name}
+    return replace(state, muted=tuple(sorted(others)) if is_alone else ())
 
 
 def pinned(state: ExplorerState, origin_mm: Point) -> ExplorerState:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import html
+from collections.abc import Sequence
+
 from naisr_model.covariates import Covariate
 from naisr_viewer.state.overlay import Quantity
 from naisr_viewer.words.titles import label
@@ -27,6 +30,10 @@ HINTS = {
 """What each choice shows."""
 
 
+MUTE = "Leave {covariate} out of the full shape"
+SOLO = "Only {covariate} in the full shape"
+"""What the switches of a covariate do."""
+
 SHARED = "One scale"
 SHARED_HINT = (
     "All surfaces with numbers of one unit share its colour scale. Drag an end of a scale to move it; a "
@@ -44,6 +51,12 @@ def rate_unit(covariate: Covariate) -> str:
 def told(covariate: Covariate | None) -> str:
     """What the numbers on the full shape are of; empty where they are of all covariates."""
     return "" if covariate is None else f"Full shape: {label(covariate.name)}, {rate_unit(covariate)}"
+
+
+def without(names: Sequence[str]) -> str:
+    """Which covariates are left out: ``without Age and Sex``."""
+    titles = [html.escape(label(name), quote=False) for name in names]
+    return f"without {' and '.join(filter(None, (', '.join(titles[:-1]), titles[-1])))}"
 
 
 def _one(unit: str) -> str:

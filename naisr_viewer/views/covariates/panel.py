@@ -5,6 +5,7 @@ from __future__ import annotations
 from PySide6.QtCore import QEvent, QObject, QSignalBlocker, QSize, Qt, Signal
 from PySide6.QtWidgets import QApplication, QFrame, QLabel, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
+from naisr_viewer.panels.maps import can_mute
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.views.colours import covariate_colour
@@ -33,6 +34,8 @@ class CovariatePanel(QFrame):
     values_settled = Signal(object)  # Named, real values: they came to rest
     support_requested = Signal(object)  # a Support: the data over other covariates, or folded the other way
     reset_requested = Signal(str)  # name: the row's reset button was pressed
+    mute_toggled = Signal(str, bool)  # name: whether it shall be left out of the full shape
+    solo_toggled = Signal(str, bool)  # name: whether all others shall be left out of it
     reset_all_requested = Signal()  # "Reset all" was pressed
     follow_toggled = Signal(bool)  # whether the others shall follow the covariate that is moved
 
@@ -74,6 +77,8 @@ class CovariatePanel(QFrame):
             row.value_moved.connect(self.value_moved)
             row.value_settled.connect(self.value_settled)
             row.reset_requested.connect(self.reset_requested)
+            row.mute_toggled.connect(self.mute_toggled)
+            row.solo_toggled.connect(self.solo_toggled)
             self.rows[covariate.name] = row
             self._rows_area.addWidget(row)
         self.title.setText(f"{label(atlas.name)} atlas")
@@ -97,10 +102,13 @@ class CovariatePanel(QFrame):
         """Put every row at its value, and say where home is: the patient's values or the population mean."""
         fit = state.fit
         told = fit.intervals if fit is not None and fit.is_valid else ()
+        is_mutable = state.atlas is not None and can_mute(state.atlas)
         intervals = {name: (low, high) for name, low, high in told}
         for (name, value), home in zip(state.named, state.home, strict=True):
             self.rows[name].set_home(home, fit is not None, intervals.get(name))
             self.rows[name].set_value(value)
+            others = set(self.rows) - {name}
+            self.rows[name].show_mutes(is_mutable, name in state.muted, others == set(state.muted))
         self._show_support(state)
         with QSignalBlocker(self.follow):
             self.follow.setChecked(state.follow)

@@ -14,6 +14,7 @@ from naisr_viewer.views.elided import ElidedLabel, unit_label
 from naisr_viewer.views.level_buttons import LevelButton, level_buttons
 from naisr_viewer.views.number_box import NumberBox
 from naisr_viewer.views.theme import Theme
+from naisr_viewer.words import maps as words
 from naisr_viewer.words.numbers import mean_reading, reading
 from naisr_viewer.words.support import along
 from naisr_viewer.words.titles import as_tip, label
@@ -21,6 +22,7 @@ from naisr_viewer.words.titles import as_tip, label
 NAME_PX = 32
 """A name is never narrower; the unit gives way."""
 
+TOOL_PX = 20
 READING_PX = 150
 """A level in words is never wider."""
 
@@ -34,6 +36,8 @@ class CovariateRow(QWidget):
     value_moved = Signal(str, float)  # name, real value: on the way, more will follow
     value_settled = Signal(str, float)  # name, real value: the user let go or paused
     reset_requested = Signal(str)  # name: the reset button was pressed
+    mute_toggled = Signal(str, bool)  # name: whether it shall be left out of the full shape
+    solo_toggled = Signal(str, bool)  # name: whether all others shall be left out of it
 
     def __init__(
         self, covariate: Covariate, observed: NDArray[np.float64], colour: str, parent: QWidget | None = None
@@ -45,6 +49,8 @@ class CovariateRow(QWidget):
         self.slider.setAccessibleName(label(covariate.name))
         self.histogram = Histogram(covariate, observed, self)
         self.reset = _reset_button(covariate, self)
+        self.mute = _switch("⊘", words.MUTE, covariate, self)
+        self.solo = _switch("◎", words.SOLO, covariate, self)
         self.box = NumberBox(covariate, self) if covariate.kind == "continuous" else None
         self.buttons = level_buttons(covariate, self) if covariate.kind == "binary" else []
         self.reading = unit_label("", self)
@@ -64,7 +70,7 @@ class CovariateRow(QWidget):
     def stops(self) -> list[QWidget]:
         """What the Tab key goes through, as it is read."""
         boxes = [] if self.box is None else [self.box]
-        return [*boxes, self.reset, *self.buttons[:1], self.slider, *self.buttons[1:]]
+        return [*boxes, self.reset, self.solo, self.mute, *self.buttons[:1], self.slider, *self.buttons[1:]]
 
     def set_home(self, value: float, is_patient: bool, interval: tuple[float, float] | None = None) -> None:
         """Say where the row is reset to.
@@ -98,6 +104,12 @@ class CovariateRow(QWidget):
         )
         self.slider.setToolTip(as_tip(along(self.covariate, stretches)))
 
+    def show_mutes(self, is_offered: bool, is_muted: bool, is_alone: bool) -> None:
+        """Say whether the covariate is left out of the full shape, or alone in it."""
+        for button, is_on in ((self.mute, is_muted), (self.solo, is_alone)):
+            button.setVisible(is_offered)
+            button.setChecked(is_on)
+
     def forget_move(self) -> None:
         """Say no more of a movement that has not come to rest."""
         self._settle.stop()
@@ -120,9 +132,15 @@ class CovariateRow(QWidget):
         head = QHBoxLayout()
         head.setSpacing(4)
         head.addWidget(name, 1)
-        for widget in (self.reading, self.box, unit, self.reset):
+        for widget in (self.reading, self.box, unit):
             if widget is not None:
                 head.addWidget(widget)
+        tools = QHBoxLayout()
+        tools.setSpacing(0)
+        for tool in (self.reset, self.solo, self.mute):
+            tool.setFixedWidth(TOOL_PX)
+            tools.addWidget(tool)
+        head.addLayout(tools)
         self.reading.setVisible(self.box is None)
         unit.setVisible(bool(self.covariate.unit))
         track = QGridLayout()
@@ -148,6 +166,8 @@ class CovariateRow(QWidget):
         self.slider.sliderReleased.connect(self._settled)
         self._settle.timeout.connect(self._settled)
         self.reset.clicked.connect(lambda: self.reset_requested.emit(self.covariate.name))
+        self.mute.clicked.connect(lambda on: self.mute_toggled.emit(self.covariate.name, on))
+        self.solo.clicked.connect(lambda on: self.solo_toggled.emit(self.covariate.name, on))
         if self.box is not None:
             self.box.committed.connect(self._moved)
         for button in self.buttons:
@@ -180,4 +200,15 @@ def _reset_button(covariate: Covariate, parent: QWidget) -> QToolButton:
     button.setText("↺")
     button.setAutoRaise(True)
     button.setAccessibleName(f"Reset {label(covariate.name)}")
+    return button
+
+
+def _switch(sign: str, hint: str, covariate: Covariate, parent: QWidget) -> QToolButton:
+    button = QToolButton(parent)
+    button.setText(sign)
+    button.setCheckable(True)
+    button.setAutoRaise(True)
+    told = hint.format(covariate=label(covariate.name))
+    button.setAccessibleName(told)
+    button.setToolTip(as_tip(told))
     return button

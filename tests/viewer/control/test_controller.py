@@ -62,6 +62,8 @@ class PanelSignals(QObject):
     support_requested = Signal(object)
     reset_requested = Signal(str)
     reset_all_requested = Signal()
+    mute_toggled = Signal(str, bool)
+    solo_toggled = Signal(str, bool)
     follow_toggled = Signal(bool)
 
 

@@ -14,6 +14,7 @@ from naisr_viewer.state.camera import Camera
 from naisr_viewer.state.drawer import Tab
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Layout
+from naisr_viewer.state.overlay import Overlay, Quantity
 from naisr_viewer.state.patients import Reading
 from naisr_viewer.state.pins import Pin
 from naisr_viewer.state.session import SavedAtlas, SavedFit, SavedPatient, Session
@@ -36,6 +37,9 @@ def everything(folder: Path) -> Session:
             has_ghost=False,
             pins=(Pin(2, (0.1, -2.0, 3.5)),),
             drawer=Tab.POINT,
+            overlay=Overlay(Quantity.RATE, (("mm per kg", 0.25),), is_shared=False),
+            muted=("sex",),
+            touched="age",
             support=Support("sex", "age", True),
         ),
         (

@@ -103,3 +103,28 @@ def test_rates_are_of_what_was_moved_last(ready):
 def words(window) -> str:
     (bar,) = window.findChildren(MapBar)
     return "\n".join(each.text() for each in bar.children() if hasattr(each, "text"))
+
+
+def test_what_is_muted_moves_the_full_shape_no_more(ready, atlas):
+    window, controller = ready
+    rows = window.covariates.rows
+    window.covariates.value_settled.emit("weight", 60.0)
+    finish(window, controller)
+    assert volume(controller) == pytest.approx(atlas.volume_cm3(age=180.0, weight=60.0), rel=0.01)
+    QTest.mouseClick(rows["weight"].mute, Qt.MouseButton.LeftButton)
+    finish(window, controller)
+    assert volume(controller) == pytest.approx(atlas.volume_cm3(age=180.0), rel=0.01)
+    assert "without Weight" in window.shapes.caption(FULL_SHAPE)
+    assert dict(controller.state.named)["weight"] == 60.0  # the slider stays where it is
+    QTest.mouseClick(rows["weight"].solo, Qt.MouseButton.LeftButton)
+    finish(window, controller)
+    assert volume(controller) == pytest.approx(atlas.volume_cm3(weight=60.0), rel=0.01)
+    assert "without Age and Sex" in window.shapes.caption(FULL_SHAPE)
+    assert rows["age"].mute.isChecked() and not rows["weight"].mute.isChecked()
+    QTest.mouseClick(rows["weight"].solo, Qt.MouseButton.LeftButton)
+    finish(window, controller)
+    assert "without" not in window.shapes.caption(FULL_SHAPE)
+
+
+def volume(controller) -> float:
+    return float(controller.shown[FULL_SHAPE].volume_cm3)
