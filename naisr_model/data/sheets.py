@@ -232,7 +232,7 @@ def decoded(path: Path, data: bytes) -> tuple[str, tuple[Remark, ...]]:
             raise InputError(f"{path.name} is {what}")
     encoding = next((code for mark, code in _MARKS.items() if data.startswith(mark)), _guessed(data))
     try:
-        text = _without_nul(path, data.decode(encoding))
+        text = _without_nul(path, data, data.decode(encoding))
         if len(data) < 4 or any(mark.isascii() for mark in text[1:]):  # as every table of ours has
             return text, ()
     except UnicodeDecodeError as error:
@@ -240,7 +240,7 @@ def decoded(path: Path, data: bytes) -> tuple[str, tuple[Remark, ...]]:
             raise _garbled(path) from error
     if encoding != "utf-8":
         raise _garbled(path)
-    text = _without_nul(path, data.decode("cp1252", errors="replace"))
+    text = _without_nul(path, data, data.decode("cp1252", errors="replace"))
     sentence = "the text is not UTF-8 and was read as Windows-1252 (Western Europe)"
     return text, (Remark("fine", "encoding", sentence, "look at names with accents, or save it as UTF-8"),)
 
@@ -259,9 +259,10 @@ def _guessed(data: bytes) -> str:
     return "utf-8"
 
 
-def _without_nul(path: Path, text: str) -> str:
+def _without_nul(path: Path, data: bytes, text: str) -> str:
     if "\x00" in text:
-        raise InputError(f"{path.name} is no text; give a table as CSV or .xlsx")
+        what = "is an atlas or another .safetensors file and" if formats.is_tensors(data) else "is"
+        raise InputError(f"{path.name} {what} no text; give a table as CSV or .xlsx")
     return text
 
 

@@ -22,6 +22,7 @@ from naisr_viewer.control.refinement import Refinement
 from naisr_viewer.control.thrift import Thrift
 from naisr_viewer.control.timeline import Timeline
 from naisr_viewer.control.worker import Worker
+from naisr_viewer.engine.atlases import Read
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.files.exports import in_the_way, planned
 from naisr_viewer.panels.kinds import with_layout_of
@@ -118,13 +119,16 @@ class Controller(QObject):
     def open(self, path: Path) -> None:
         """Read an atlas beside the window and show it at its population mean.
 
-        Where patients are open it is asked first: they belong to the atlas that is left.
+        Where patients are open it is asked, once the file has been found to be an atlas: they belong to the
+        one that is left.
         """
-        if not self.questions.may_lose(OPEN_ATLAS, self.state.patients):
-            return
         self._window.show_opening(path.name)
-        job = jobs.opening(self._engine, path.absolute())
-        self.refinement.run(f"Opening {path.name} …", job, self.show_atlas)
+        job = jobs.reading_atlas(self._engine, path.absolute())
+        self.refinement.run(f"Opening {path.name} …", job, self._show_read)
+
+    def _show_read(self, read: Read) -> None:
+        if self.questions.may_lose(OPEN_ATLAS, self.state.patients):
+            self.show_atlas(self._engine.begin(read))
 
     def show_atlas(self, card: AtlasCard, values: Mapping[str, float] = MappingProxyType({})) -> None:
         """Show an atlas that is open in the engine; covariates left out are at their mean."""
@@ -299,6 +303,7 @@ class Controller(QObject):
         window.undo_requested.connect(self.undo)
         window.redo_requested.connect(self.redo)
         window.layout_requested.connect(self.set_layout)
+        window.covariates.refused.connect(self.refinement.tell)
         window.covariates.mute_toggled.connect(self.set_mute)
         window.covariates.solo_toggled.connect(self.set_solo)
         window.quantity_chosen.connect(self.set_quantity)

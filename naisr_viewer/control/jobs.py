@@ -8,6 +8,7 @@ from pathlib import Path
 
 from naisr_model.progress import Progress
 from naisr_viewer.control.worker import Deliver, Job
+from naisr_viewer.engine.atlases import Read
 from naisr_viewer.engine.clinic import Clinic
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.engine.ledgers import ledger, origin_mm
@@ -15,7 +16,7 @@ from naisr_viewer.engine.sessions import Restored, completed, restored
 from naisr_viewer.files.exports import Planned
 from naisr_viewer.files.figure import figure_bytes
 from naisr_viewer.files.matrix import MatrixPlan, figure_of, write_matrix
-from naisr_viewer.files.sessions import read_session, write_session
+from naisr_viewer.files.sessions import write_session
 from naisr_viewer.files.surfaces import require_writable, write_surface
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState
@@ -49,9 +50,9 @@ class ExportReport:
         return f"Exported {surfaces} as {self.choice.format.upper()} to {self.choice.folder}"
 
 
-def opening(engine: Engine, path: Path) -> Job[AtlasCard]:
-    """Reads an atlas; hands over its card."""
-    return lambda deliver, _progress: deliver(engine.open(path))
+def reading_atlas(engine: Engine, path: Path) -> Job[Read]:
+    """Reads an atlas; hands it over, still to be opened."""
+    return lambda deliver, _progress: deliver(engine.read(path))
 
 
 def frame(engine: Engine, requests: Sequence[SurfaceRequest]) -> Job[Surfaces]:
@@ -136,9 +137,9 @@ def saving(engine: Engine, session: Session, persons: Sequence[int], path: Path)
     return job
 
 
-def restoring(engine: Engine, clinic: Clinic, path: Path) -> Job[Restored]:
+def restoring(engine: Engine, clinic: Clinic, session: Session) -> Job[Restored]:
     """Opens what a session had open; hands it over."""
-    return lambda deliver, progress: deliver(restored(engine, clinic, read_session(path), progress))
+    return lambda deliver, progress: deliver(restored(engine, clinic, session, progress))
 
 
 def pinning(engine: Engine, surface: SurfaceRequest, point_mm: Point) -> Job[Point]:

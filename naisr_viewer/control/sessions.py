@@ -16,6 +16,7 @@ from naisr_viewer.control.worker import Job, Worker
 from naisr_viewer.engine.clinic import Clinic
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.engine.sessions import Restored
+from naisr_viewer.files.sessions import read_session
 from naisr_viewer.state.questions import OPEN_ATLAS
 from naisr_viewer.state.session import session_of, state_of
 from naisr_viewer.views.main_window import MainWindow
@@ -71,8 +72,13 @@ class SessionDesk(QObject):
     def open(self, path: Path) -> None:
         """Bring back what a session had on screen; what is open makes room for it."""
         controller = self._controller
+        try:
+            session = read_session(path.absolute())
+        except InputError as error:
+            self._failed(error)
+            return
         if controller.questions.may_lose(OPEN_ATLAS, controller.state.patients):
-            job = jobs.restoring(self._engine, self._clinic, path.absolute())
+            job = jobs.restoring(self._engine, self._clinic, session)
             controller.refinement.run(f"Opening {path.name} …", job, self._show)
 
     def go_on(self) -> None:

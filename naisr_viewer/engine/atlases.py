@@ -56,6 +56,10 @@ class Opened:
     picture: SurfaceResult | None
 
 
+Read = tuple[Opened, "Atlas | None"]
+"""A file that was read, with its networks where they had to be loaded."""
+
+
 class Atlases:
     """Opens atlases, and loads their networks when they are first needed; any thread may ask.
 
@@ -84,8 +88,8 @@ class Atlases:
         """Whether nothing has taken its place."""
         return self._opened.get(opened.card.path) is opened
 
-    def read(self, path: Path) -> tuple[Opened, Atlas | None]:
-        """What :meth:`begin` takes: a file read afresh, with its networks where they had to be loaded.
+    def read(self, path: Path) -> Read:
+        """What :meth:`begin` takes: a file read afresh.
 
         Raises:
             InputError: when there is no such file or it is not an atlas of surfaces.

@@ -15,7 +15,7 @@ from naisr_model.errors import Cancelled
 from naisr_model.progress import SILENT, Progress
 from naisr_viewer.engine.answers.base import Who
 from naisr_viewer.engine.answers.kinds import ANSWERS
-from naisr_viewer.engine.atlases import Atlases, Opened, load_atlas
+from naisr_viewer.engine.atlases import Atlases, Opened, Read, load_atlas
 from naisr_viewer.engine.cache import Cache, Opening, cache_folder, first_picture
 from naisr_viewer.engine.people import FittedPerson
 from naisr_viewer.engine.previews import Previews
@@ -60,7 +60,19 @@ class Engine:
         Raises:
             InputError: when there is no such file or it is not an atlas of surfaces.
         """
-        opened, atlas = self._atlases.read(path)
+        return self.begin(self.read(path))
+
+    def read(self, path: Path) -> Read:
+        """What :meth:`begin` opens: a file read afresh; what is open stays so.
+
+        Raises:
+            InputError: when there is no such file or it is not an atlas of surfaces.
+        """
+        return self._atlases.read(path)
+
+    def begin(self, read: Read) -> AtlasCard:
+        """Have an atlas open that was read, and describe it; whoever was fitted to its file is forgotten."""
+        opened, atlas = read
         with self._lock:  # what belongs to another file is gone before anybody can ask of this one
             closed = self._atlases.begin(opened, atlas)
             self._people = {key: each for key, each in self._people.items() if each.atlas not in closed}
@@ -68,6 +80,18 @@ class Engine:
             if opened.picture is not None:
                 self._results[opened.picture.request] = opened.picture
         return opened.card
+
+    def card_of(self, path: Path) -> AtlasCard:
+        """Describe an atlas file; unless exactly that is open, it is opened. Who was fitted stays known.
+
+        Raises:
+            InputError: when there is no such file or it is not an atlas of surfaces.
+        """
+        read = self.read(path)
+        with contextlib.suppress(Cancelled):
+            if (open_already := self._atlases[path]).fingerprint == read[0].fingerprint:
+                return open_already.card
+        return self.begin(read)
 
     def was_kept(self, path: Path) -> bool:
         """Whether the first picture of an open atlas came from the cache."""

@@ -78,7 +78,7 @@ def restored(engine: Engine, clinic: Clinic, session: Session, progress: Progres
         Cancelled: when nobody waits any more.
     """
     path, notes = _atlas_of(session.atlas)
-    card = engine.open(path)
+    card = engine.card_of(path)
     _require_inside(session, card)
     patients: list[OpenScan] = []
     for saved, piece in progress.over(session.patients):

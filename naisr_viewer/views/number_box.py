@@ -13,7 +13,8 @@ from naisr_model.errors import InputError
 from naisr_viewer.words.numbers import written
 from naisr_viewer.words.titles import as_tip, label
 
-WIDTH_PX = 76
+LEAST_PX, WIDTH_PX = 76, 88
+"""Eight digits have room where there is any."""
 STEPS = {Qt.Key.Key_Up: 1, Qt.Key.Key_Down: -1, Qt.Key.Key_PageUp: 10, Qt.Key.Key_PageDown: -10}
 EDITING = (Qt.Key.Key_A, Qt.Key.Key_C, Qt.Key.Key_V, Qt.Key.Key_X)
 UNDOING = (Qt.Key.Key_Z, Qt.Key.Key_Y)
@@ -38,13 +39,15 @@ class NumberBox(QLineEdit):
     """
 
     committed = Signal(float)  # a number inside the range is finished: by Enter, focus, arrow keys or wheel
+    refused = Signal(str)  # why what was typed is not taken
 
     def __init__(self, covariate: Covariate, parent: QWidget) -> None:
         super().__init__(parent)
         self.covariate = covariate
         self._taken: float | None = None
         self.setAlignment(Qt.AlignmentFlag.AlignRight)
-        self.setFixedWidth(WIDTH_PX)
+        self.setMinimumWidth(LEAST_PX)
+        self.setMaximumWidth(WIDTH_PX)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName(f"{label(covariate.name)} in {covariate.unit}".removesuffix(" in "))
         self.textChanged.connect(self._mark)
@@ -97,6 +100,7 @@ class NumberBox(QLineEdit):
         elif value == self._taken:
             self.put(value)
         elif self.complaint:
+            self.refused.emit(self.complaint)
             QToolTip.showText(self.mapToGlobal(self.rect().bottomLeft()), self.toolTip(), self)
         else:
             self._take(value)

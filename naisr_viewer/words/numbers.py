@@ -40,7 +40,7 @@ def interval_reading(covariate: Covariate, low: float, high: float) -> str:
     told = interval_in_words(covariate, low, high, reading)
     if covariate.kind == "binary":
         return "inferred" if low == high else f"inferred; {told}"
-    return f"95 %: {told}"
+    return f"95\u00a0%: {told}"
 
 
 def length(mm: float) -> str:

@@ -68,7 +68,7 @@ def findings(fit: Fitted, covariates: Sequence[Covariate]) -> list[tuple[str, st
         lasting.append(("Lasting", f"{100 * fit.lasting:.0f} %", "of what sets the patient apart"))
     return [
         *rows,
-        ("Volume", f"{volume(fit.volume_cm3, fit.volume_margin_cm3)} (95 %)", ""),
+        ("Volume", f"{volume(fit.volume_cm3, fit.volume_margin_cm3)} (95\u00a0%)", ""),
         ("Residual", length(fit.residual_mm), RESIDUAL),
         *lasting,
         ("Time", duration(fit.seconds), ""),

@@ -34,6 +34,7 @@ class CovariatePanel(QFrame):
     values_settled = Signal(object)  # Named, real values: they came to rest
     support_requested = Signal(object)  # a Support: the data over other covariates, or folded the other way
     reset_requested = Signal(str)  # name: the row's reset button was pressed
+    refused = Signal(str)  # why a number that was typed is not taken
     mute_toggled = Signal(str, bool)  # name: whether it shall be left out of the full shape
     solo_toggled = Signal(str, bool)  # name: whether all others shall be left out of it
     reset_all_requested = Signal()  # "Reset all" was pressed
@@ -77,6 +78,7 @@ class CovariatePanel(QFrame):
             row.value_moved.connect(self.value_moved)
             row.value_settled.connect(self.value_settled)
             row.reset_requested.connect(self.reset_requested)
+            row.refused.connect(self.refused)
             row.mute_toggled.connect(self.mute_toggled)
             row.solo_toggled.connect(self.solo_toggled)
             self.rows[covariate.name] = row

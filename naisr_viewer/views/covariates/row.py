@@ -36,6 +36,7 @@ class CovariateRow(QWidget):
     value_moved = Signal(str, float)  # name, real value: on the way, more will follow
     value_settled = Signal(str, float)  # name, real value: the user let go or paused
     reset_requested = Signal(str)  # name: the reset button was pressed
+    refused = Signal(str)  # why a number that was typed is not taken
     mute_toggled = Signal(str, bool)  # name: whether it shall be left out of the full shape
     solo_toggled = Signal(str, bool)  # name: whether all others shall be left out of it
 
@@ -170,6 +171,7 @@ class CovariateRow(QWidget):
         self.solo.clicked.connect(lambda on: self.solo_toggled.emit(self.covariate.name, on))
         if self.box is not None:
             self.box.committed.connect(self._moved)
+            self.box.refused.connect(self.refused)
         for button in self.buttons:
             button.clicked.connect(self._level_chosen)
 

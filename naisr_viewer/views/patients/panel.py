@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from PySide6.QtCore import QEvent, QObject, QSize, Qt, QTimer, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QScrollArea, QVBoxLayout, QWidget
@@ -86,7 +87,15 @@ class PatientPanel(QFrame):
     @property
     def stops(self) -> list[QWidget]:
         """What the Tab key goes through, as it is read."""
-        top = [self.open, self.scan.reread_changed, self._area, self.list, self.scan.reread, self.scan.ghost]
+        top = [
+            self.open,
+            self.scan.reread_changed,
+            self._area,
+            self.list,
+            self.scan.reread,
+            self.scan.relabel,
+            self.scan.ghost,
+        ]
         middle = [self.alignment.method, self.alignment.unit, *self.known.stops()]
         return [*top, *middle, self.compare.box, self.known.align, self.known.fit]
 
@@ -178,10 +187,16 @@ class PatientPanel(QFrame):
         head.addWidget(title, 1)
         head.addWidget(self.open)
 
+    def _read_another_label(self) -> None:
+        """Which one is asked as it was when the file was opened."""
+        if self._state.shown is not None:
+            self.reading_changed.emit(replace(self._state.shown.reading, label=None))
+
     def _connect(self) -> None:
         self.open.clicked.connect(self.open_requested)
         self.list.patient_chosen.connect(self.patient_chosen)
         self.list.close_requested.connect(self.close_requested)
+        self.scan.relabel.clicked.connect(self._read_another_label)
         for reread in (self.scan.reread, self.scan.reread_changed):
             reread.clicked.connect(self.reread_requested)
         self.scan.ghost.clicked.connect(self.ghost_toggled)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QFormLayout, QFrame, QHBoxLayout, QVBoxLayout, QWidget
 
 from naisr_viewer.state.patients import Method, OpenScan, Reading
@@ -16,6 +16,7 @@ from naisr_viewer.words.patients import METHODS, breakable, measured, sentence, 
 from naisr_viewer.words.titles import as_tip
 
 REREAD_TIP = "Read the file from the disk again, for example after it was edited"
+RELABEL_TIP = "Read another label of the same volume; Ctrl+Z comes back to this one"
 GHOST_TIP = "Draw what was measured, transparent, over the atlas's shape"
 SEE_FIRST = "The scan is drawn over the atlas as it lies; see that it fits before it is fitted."
 
@@ -26,6 +27,7 @@ class ScanPart(QWidget):
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
         self.reread = button("Read again", REREAD_TIP, "small")
+        self.relabel = button("Other label…", RELABEL_TIP, "small")
         self.reread_changed = button("Read again", REREAD_TIP)
         self.told_changed = ElidedLabel("File changed on disk")
         self.changed = QFrame()  # for the panel, which keeps it in sight
@@ -55,6 +57,7 @@ class ScanPart(QWidget):
         self.blocked.setVisible(bool(scan.blocked))
         self.told_changed.set_hint(f"{patient.reading.path} has changed since it was read")
         self.reread.setVisible(not patient.is_changed)
+        self.relabel.setVisible(patient.reading.label is not None)
         self.ghost.setChecked(has_ghost)
 
     def _compose(self) -> None:
@@ -68,6 +71,7 @@ class ScanPart(QWidget):
         facts.addWidget(self.volume)
         column = section(self, "Scan", self.reread)
         column.addLayout(facts)
+        column.addWidget(self.relabel, 0, Qt.AlignmentFlag.AlignLeft)
         for widget in (self.blocked, self.notes, self.repairs, self.ghost):
             column.addWidget(widget)
 

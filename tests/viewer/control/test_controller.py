@@ -63,6 +63,7 @@ class PanelSignals(QObject):
     reset_requested = Signal(str)
     reset_all_requested = Signal()
     mute_toggled = Signal(str, bool)
+    refused = Signal(str)
     solo_toggled = Signal(str, bool)
     follow_toggled = Signal(bool)
 

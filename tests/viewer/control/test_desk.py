@@ -5,13 +5,14 @@ from __future__ import annotations
 import gc
 import json
 import os
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 import pyvista as pv
 import trimesh
-from eggs import egg, turned
+from eggs import egg, label_volume, turned
 from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QTimer, QUrl
 from PySide6.QtGui import QAction, QDropEvent
 from PySide6.QtTest import QTest
@@ -23,6 +24,7 @@ from naisr_viewer.program.start import make_window
 from naisr_viewer.state.history import UNDO_DEPTH
 from naisr_viewer.state.layouts import FULL_SHAPE, TEMPLATE, Layout, Panel
 from naisr_viewer.state.patients import Reading
+from naisr_viewer.state.questions import Answer
 from naisr_viewer.state.requests import ExportChoice
 from naisr_viewer.views import main_window
 from naisr_viewer.words.numbers import gained, volume
@@ -658,3 +660,76 @@ def test_exports_of_two_versions_of_a_file_do_not_meet(fitted, qtbot, tmp_path):
     full_shape = "full-shape_age6_sexM.stl"
     assert names == {f"eggs-p01-{full_shape}", f"eggs-p01-2-{full_shape}", "eggs-template.stl"}
     assert json.loads((tmp_path / "out" / "eggs-template.stl.json").read_text())["patient"] is None
+
+
+def test_a_file_is_judged_before_it_is_asked_what_may_be_lost(ready, qtbot, scan_file, tmp_path, monkeypatch):
+    window, controller = ready
+    asked: list[str] = []
+
+    def decline(question, *_) -> Answer:
+        asked.append(question.name)
+        return Answer(goes_on=False)
+
+    controller.questions.is_attended = True
+    monkeypatch.setattr(window, "ask", decline)
+    drop(window, scan_file)
+    settle(qtbot, controller)
+    before = controller.state
+    for name in ("broken.safetensors", "broken.json"):
+        (tmp_path / name).write_bytes(b"nothing of the kind")
+        drop(window, tmp_path / name)
+        settle(qtbot, controller)
+        assert name in window.error_text.text()
+    assert asked == []
+    good = Path(shutil.copy(before.atlas.path, tmp_path / "good.safetensors"))
+    drop(window, good)
+    settle(qtbot, controller)
+    assert asked == ["open atlas"]  # and it was answered with no
+    assert controller.state.atlas is before.atlas and controller.state.patients == before.patients
+    controller.questions.is_attended = False  # so that the window may close
+
+
+def test_another_label_of_an_open_volume_is_read(ready, qtbot, tmp_path, monkeypatch):
+    window, controller = ready
+    answers = iter((2, 1, None))
+    monkeypatch.setattr(main_window, "ask_label", lambda *_: next(answers))
+    drop(window, label_volume(tmp_path / "labels.nii"))
+    settle(qtbot, controller)
+    egg_cm3 = controller.state.shown.scan.volume_cm3
+    for expected in (1, 1):  # another label; then nobody chooses
+        QTest.mouseClick(window.patients.scan.relabel, Qt.MouseButton.LeftButton)
+        settle(qtbot, controller)
+        assert controller.state.shown.reading.label == expected
+    assert controller.state.shown.scan.volume_cm3 != egg_cm3
+    window.undo_requested.emit()
+    settle(qtbot, controller)
+    assert controller.state.shown.reading.label == 2
+
+
+def test_why_a_number_is_not_taken_stands_in_the_status_line(ready, qtbot):
+    window, controller = ready
+    box = window.covariates.rows["age"].box
+    QTest.mouseClick(box, Qt.MouseButton.LeftButton)
+    box.selectAll()
+    QTest.keyClicks(box, "412")
+    QTest.keyClick(box, Qt.Key.Key_Return)
+    assert "“412” is outside the data behind the atlas" in window.status.text()
+    assert dict(controller.state.named)["age"] != 412
+
+
+def test_a_session_that_is_cancelled_takes_nothing_away(ready, qtbot, scan_file, tmp_path):
+    window, controller = ready
+    drop(window, scan_file)
+    settle(qtbot, controller)
+    window.patients.known.fit.click()
+    settle(qtbot, controller)
+    window.session_place_chosen.emit(tmp_path / "s.json")
+    settle(qtbot, controller)
+    before = controller.state
+    window.session_requested.emit(tmp_path / "s.json")
+    window.cancel_requested.emit()
+    settle(qtbot, controller)
+    assert controller.state.patients == before.patients
+    window.covariates.value_settled.emit("age", 3.0)
+    settle(qtbot, controller)
+    assert controller.shown[FULL_SHAPE].request.person == before.person  # who is still known

@@ -34,8 +34,8 @@ def test_digits_suit_the_range():
 
 def test_an_interval_is_told_in_the_covariates_own_digits(card):
     age, weight, sex = card.covariates
-    assert interval_reading(age, 71.2, 96.8) == "95 %: 71 to 97 months"
-    assert interval_reading(weight, 18.23, 24.91) == "95 %: 18.2 to 24.9 kg"
+    assert interval_reading(age, 71.2, 96.8) == "95\u00a0%: 71 to 97 months"
+    assert interval_reading(weight, 18.23, 24.91) == "95\u00a0%: 18.2 to 24.9 kg"
     assert interval_reading(sex, -1, 1) == "inferred; F or M"
     assert interval_reading(sex, 1, 1) == "inferred"
 

@@ -237,9 +237,9 @@ def test_a_known_covariate_has_no_band(panel, card):
 def test_marks_are_told_apart_on_hover(panel, card):
     panel.show_values(with_fit(card))
     age, weight, sex = (panel.rows[name].histogram.toolTip() for name in ("age", "weight", "sex"))
-    assert "Triangle: patient 84 months" in age and "95 %" not in age
+    assert "Triangle: patient 84 months" in age and "95\u00a0%" not in age
     assert "Tick: population mean 100 months" in age
-    assert "Triangle: patient 21.3 kg, 95 %: 18.2 to 34.9" in weight
+    assert "Triangle: patient 21.3 kg, 95\u00a0%: 18.2 to 34.9" in weight
     assert "Triangle: patient F" in sex
     panel.show_values(opened(ExplorerState(), card))
     assert "patient" not in panel.rows["age"].histogram.toolTip()

@@ -448,15 +448,15 @@ def test_the_tab_key_goes_from_top_to_bottom(panel, start, qtbot):
 def test_the_result_tells_values_and_how_sure_they_are(panel, start):
     panel.show_state(with_patient(start, replace(ONE, fit=FIT)))
     said = words(panel.result).split("\n")
-    for word in ("84 months", "known", "21.4 kg", "95 %: 18.2 to 24.9 kg", "M", "inferred; F or M"):
+    for word in ("84 months", "known", "21.4 kg", "95\u00a0%: 18.2 to 24.9 kg", "M", "inferred; F or M"):
         assert word in said
-    for word in ("48.3 ± 2.1 cm³ (95 %)", "0.31 mm", "2.3 s"):
+    for word in ("48.3 ± 2.1 cm³ (95\u00a0%)", "0.31 mm", "2.3 s"):
         assert word in said
     assert "The shape does not tell sex: both levels explain it" in said
     panel.show_state(
         with_patient(start, replace(ONE, fit=replace(FIT, person=2, volume_cm3=50.0, remarks=())))
     )
-    assert "50.0 ± 2.1 cm³ (95 %)" in words(panel.result)
+    assert "50.0 ± 2.1 cm³ (95\u00a0%)" in words(panel.result)
     assert "does not tell" not in words(panel.result)
 
 
