@@ -49,9 +49,15 @@ class Gauge:
         """A measure of each shape that the coarse template was carried to, in its unit."""
         return curve(measure, shapes) * measure.of(self.fine) / measure.of(self.coarse)
 
-    def curves(self, shapes: Sequence[Surface]) -> dict[str, NDArray[np.float64]]:
-        """All measures of each shape, by name."""
-        return {name: self.curve(one, shapes) for name, one in self.measures.items()}
+    def curves(
+        self, shapes: Sequence[Surface], *, progress: Progress = SILENT
+    ) -> dict[str, NDArray[np.float64]]:
+        """All measures of each shape, by name.
+
+        Raises:
+            Cancelled: when nobody waits any more.
+        """
+        return {name: self.curve(one, shapes) for (name, one), _ in progress.over(self.measures.items())}
 
 
 def gauge_of(atlas: Atlas, *, progress: Progress = SILENT) -> Gauge:

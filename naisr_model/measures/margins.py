@@ -1,9 +1,9 @@
 """How sure the measures of a fitted person are.
 
 To first order a measure changes with the surface's offset along its normal. The offsets are those of the
-fit's posterior, see :mod:`naisr_model.learning.fitting.posterior`: each of its independent directions is tried,
-and so is what the atlas cannot express, as an offset of each of many patches of the surface by itself. The
-variances add up.
+fit's posterior, see :mod:`naisr_model.learning.fitting.posterior`: each of its independent directions is
+tried, and so is what the atlas cannot express, as an offset of each of many patches of the surface by itself.
+The variances add up.
 """
 
 from __future__ import annotations

@@ -33,8 +33,8 @@ WIDENING = 1.1
 """Standard deviation among people whom the networks were not fitted to, over that among the training people.
 Chosen over 150 synthetic airways of another seed than those of training and ``naisr evaluate norms``."""
 
-RECONSTRUCTED = 0.85
-"""Of the work, once everybody is reconstructed; the rest is measuring."""
+RECONSTRUCTED, MEASURED = 0.8, 0.9
+"""Share of the work that is done then."""
 
 LEAST_DIFFERENCE = 1e-6
 """Of ratios; below it everybody is alike."""
@@ -204,13 +204,16 @@ class LocalSpread:
         return atlas.sdf(points_mm, covariates) / self.sd_mm(atlas, points_mm, covariates)
 
 
-def local_spread_of(people: People) -> LocalSpread:
+def local_spread_of(people: People, *, progress: Progress = SILENT) -> LocalSpread:
     """How far the training people's surfaces lie from the population's, by the place on the template.
 
     The distance is the signed one from a point of the population's surface to the person's.
+
+    Raises:
+        Cancelled: when nobody waits any more.
     """
-    pairs = zip(people.usual_mm, people.own_mm, strict=True)
-    away = np.stack([_distances(people.template, *pair) for pair in pairs])
+    pairs = list(zip(people.usual_mm, people.own_mm, strict=True))
+    away = np.stack([_distances(people.template, *pair) for pair, _ in progress.over(pairs)])
     sizes = np.array([_size_mm(people.template.moved(points_mm)) for points_mm in people.usual_mm])
     shares = WIDENING * np.sqrt(np.mean((away / sizes[:, None]) ** 2, axis=0))
     return LocalSpread(np.asarray(people.template.points_mm), shares, people.template)
@@ -277,9 +280,8 @@ def norms_of(atlas: Atlas, *, progress: Progress = SILENT) -> Norms:
     gauge = gauge_of(atlas, progress=progress.quiet)
     people = people_of(atlas, gauge.coarse, progress=progress.part(0.0, RECONSTRUCTED))
     own, usual = (
-        gauge.curves([people.template.moved(points_mm) for points_mm in shapes])
+        gauge.curves([people.template.moved(points_mm) for points_mm in shapes], progress=progress.quiet)
         for shapes in (people.own_mm, people.usual_mm)
     )
-    progress.check()
     spreads = {name: _spread(own[name] / usual[name]) for name in own}
-    return Norms(atlas, gauge, own, spreads, local_spread_of(people))
+    return Norms(atlas, gauge, own, spreads, local_spread_of(people, progress=progress.part(MEASURED, 1.0)))

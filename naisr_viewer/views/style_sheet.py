@@ -90,6 +90,7 @@ def style_sheet(theme: Theme) -> str:
     #drawer QToolButton:checked {{ color: {t.text}; background: {t.line}; font-weight: 600; }}
     #chart {{ border: 1px solid {t.line}; border-radius: 5px; }}
     #chart:focus {{ border-color: {t.accent}; }}
+    #small {{ padding: 2px 8px; }}
     #fold {{ border: 1px solid transparent; border-radius: 4px; font-weight: 600; padding: 2px; }}
     #fold:focus {{ border-color: {t.accent}; }}
     #section {{ font-size: 11pt; font-weight: 600; }}

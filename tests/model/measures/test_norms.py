@@ -116,8 +116,8 @@ def test_norms_are_kept_without_shapes(norms, tmp_path):
     again, values = load_norms(file, norms.atlas), {"age": 6.0, "sex": 1.0}
     assert measure_record(again, values) == measure_record(norms, values)
     points = 1.05 * np.asarray(norms.gauge.coarse.points_mm)
-    scores = (each.local.scores(norms.atlas, points, values) for each in (again, norms))
-    assert np.array_equal(*scores)
+    kept, fresh = (each.local.scores(norms.atlas, points, values) for each in (again, norms))
+    assert np.array_equal(kept, fresh)
 
 
 @pytest.mark.parametrize("name", ["own.volume", "ratios.area", "local"])

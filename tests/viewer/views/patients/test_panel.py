@@ -500,7 +500,7 @@ def test_one_whose_fit_missed_cannot_be_compared_with(panel, start, heard):
     state = replace(with_patient(others, replace(ONE, fit=FIT)), compared=2)
     panel.show_state(state)
     box = panel.compare.box
-    assert box.currentData() is None and state.reference == FIT
+    assert box.currentData() is None and state.reference == (FIT.person, FIT.values)
     hint = box.itemData(box.findText("p02.ply"), Qt.ItemDataRole.ToolTipRole)
     assert "cannot be compared with" in hint and "not valid" in hint
     box.setFocus()
