@@ -76,7 +76,6 @@ class Previews:
         kept = self._before
         if kept is not None and kept[:3] == (path, person, values):
             return kept[3]
-        near = kept[3] if kept is not None and kept[:2] == (path, person) else None
-        tracked = tracker.track(dict(values), near)
+        tracked = tracker.track(dict(values))
         self._before = (path, person, values, tracked)
         return tracked

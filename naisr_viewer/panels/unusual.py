@@ -46,5 +46,6 @@ KIND = PanelKind(
     colour=shape.COLOUR,
     scale="signed",
     unit="SD",
+    quantity="outside_band",
     is_possible=can_judge,
 )

@@ -17,7 +17,7 @@ from naisr_viewer.state.patients import Fitted, Named, OpenScan
 from naisr_viewer.state.pins import Pin, Point, with_pin
 from naisr_viewer.state.support import NOTHING_CHOSEN, Support, suited
 
-AVERAGE = 0
+AVERAGE_KEY = 0
 """Stands among the keys of patients for the population's average."""
 
 
@@ -32,7 +32,7 @@ class ExplorerState:
         follow: whether the other covariates follow one that is moved, as they do in the population.
         patients: the scans that are open.
         patient: key of the one that is shown; None for the population average.
-        compared: key of the one that is compared with; None for the patient as fitted, :data:`AVERAGE` for
+        compared: key of the one that is compared with; None for the patient as fitted, :data:`AVERAGE_KEY` for
             the population's average at the same covariates.
         has_ghost: whether the scan is drawn over the full shape.
         pins: places that are marked in all shapes, and told of.
@@ -90,7 +90,7 @@ class ExplorerState:
     @property
     def reference(self) -> tuple[int, Named] | None:
         """The person that is compared with, and at which covariates; None where there is no fit."""
-        if self.compared == AVERAGE and self.fit is not None:
+        if self.compared == AVERAGE_KEY and self.fit is not None:
             return 0, self.named
         other = self.find(self.compared)
         fit = other.fit if other and other.fit and other.fit.is_valid else self.fit

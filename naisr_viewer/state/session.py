@@ -7,7 +7,7 @@ from pathlib import Path
 
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.camera import Camera
-from naisr_viewer.state.explorer import AVERAGE, ExplorerState, with_possible_layout
+from naisr_viewer.state.explorer import AVERAGE_KEY, ExplorerState, with_possible_layout
 from naisr_viewer.state.matrix import kept_matrix
 from naisr_viewer.state.patients import Named, OpenScan, Reading
 from naisr_viewer.state.support import suited
@@ -102,7 +102,7 @@ def state_of(session: Session, card: AtlasCard, patients: tuple[OpenScan, ...]) 
             patients=patients,
             matrix=kept_matrix(card, state.matrix),
             patient=state.patient if state.patient in keys else None,
-            compared=state.compared if state.compared in keys | {AVERAGE} else None,
+            compared=state.compared if state.compared in keys | {AVERAGE_KEY} else None,
             support=suited(state.support, card),
         )
     )

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QWidget
 
 from naisr_model.covariates import Covariate
 from naisr_viewer.state.curves import Standing
-from naisr_viewer.state.explorer import AVERAGE, ExplorerState
+from naisr_viewer.state.explorer import AVERAGE_KEY, ExplorerState
 from naisr_viewer.state.patients import Fitted
 from naisr_viewer.views.patients.pieces import ChoiceBox, grid_in, paragraph, section, warnings
 from naisr_viewer.words import curves
@@ -72,7 +72,7 @@ class ComparePart(QWidget):
             (each, each.fit) for each in state.patients if each.fit is not None and each.key != state.patient
         ]
         choices = [
-            (AVERAGE, "average at the same covariates"),
+            (AVERAGE_KEY, "average at the same covariates"),
             (None, "this patient as fitted"),
             *((each.key, each.name) for each, _ in others),
         ]

@@ -14,7 +14,7 @@ from naisr_viewer.panels.curves import curve_request
 from naisr_viewer.panels.kinds import request_for
 from naisr_viewer.state.curves import CurveChoice, CurveRequest, readout
 from naisr_viewer.state.drawer import Tab
-from naisr_viewer.state.explorer import AVERAGE, ExplorerState, knowing_norms
+from naisr_viewer.state.explorer import AVERAGE_KEY, ExplorerState, knowing_norms
 from naisr_viewer.state.layouts import Panel
 from naisr_viewer.state.pins import Pin
 from naisr_viewer.state.requests import EXACT_RESOLUTION
@@ -137,7 +137,7 @@ def test_places_beyond_the_band_have_colours_once_it_is_known(desk):
 
 def test_a_patient_is_compared_with_the_average_at_the_same_covariates(desk):
     engine, _, state = desk
-    state = replace(state, compared=AVERAGE)
+    state = replace(state, compared=AVERAGE_KEY)
     result = engine.surface(request_for(state, CHANGE, EXACT_RESOLUTION))
     assert result.request.before == (0, state.named)
     average = engine.atlas(state.atlas.path).sdf(result.points_mm, dict(state.named))
