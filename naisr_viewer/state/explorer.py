@@ -32,8 +32,8 @@ class ExplorerState:
         follow: whether the other covariates follow one that is moved, as they do in the population.
         patients: the scans that are open.
         patient: key of the one that is shown; None for the population average.
-        compared: key of the one that is compared with; None for the patient as fitted, :data:`AVERAGE_KEY` for
-            the population's average at the same covariates.
+        compared: key of the one that is compared with; None for the patient as fitted,
+            :data:`AVERAGE_KEY` for the population's average at the same covariates.
         has_ghost: whether the scan is drawn over the full shape.
         pins: places that are marked in all shapes, and told of.
         matrix: what shapes are laid out by in that layout; None where there are no two covariates.

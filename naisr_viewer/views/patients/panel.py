@@ -85,6 +85,10 @@ class PatientPanel(QFrame):
         self.standings = exchange(self.standings, standings_part(standings) if standings else QWidget())
         self.standings.setVisible(bool(standings))
 
+    def reveal_standings(self) -> None:
+        """Scroll to where the measures stand."""
+        self._area.ensureWidgetVisible(self.standings, 0, 16)
+
     def sizeHint(self) -> QSize:
         """As wide as it may be; a narrow window gives it less."""
         return QSize(PANEL_WIDTH, super().sizeHint().height())
