@@ -145,6 +145,7 @@ class NormsDesk(QObject):
         self._window.show_standings(())
 
     def _know(self) -> None:
+        self._begun = False  # who comes back to the atlas learns it at once
         self._window.show_reckoning(NOTHING_RECKONED)
         self._controller.go(knowing_norms(self._controller.state))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -79,6 +80,14 @@ def test_dragging_the_line_is_dragging_the_slider(ready, qtbot):
     finish(window, controller)
     QTest.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
     assert controller.state.values == before  # one step
+
+
+def test_who_begins_anew_with_an_atlas_learns_at_once_what_is_usual(ready, qtbot):
+    window, controller = ready
+    open_curve(window, controller, qtbot)
+    controller.begin(replace(controller.state, has_norms=False))
+    finish(window, controller)
+    assert controller.state.has_norms and "95 % of people:" in text(window)
 
 
 def test_another_measure_along_another_covariate(ready, qtbot):
