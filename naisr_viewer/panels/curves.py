@@ -27,7 +27,7 @@ def curve_request(state: ExplorerState) -> CurveRequest | None:
     return CurveRequest(
         state.atlas.path,
         name,
-        tuple((other, value) for other, value in state.named if other != name),
+        tuple((other, value) for other, value in state.heard if other != name),
         state.person if state.can_forecast else 0,
         state.pins[:PLACES_APART] if len(state.pins) >= PLACES_APART else (),
     )

@@ -23,7 +23,7 @@ from naisr_viewer.words.titles import as_tip, label
 if TYPE_CHECKING:
     from naisr_viewer.views.charts.curves import CurveChart
 
-SIDE_PX = 252
+LEAST_SIDE_PX, SIDE_PX = 200, 252
 """Width of what stands beside the chart."""
 
 CSV_TIP = "Write the curve, what 95 % of people have, the patient and the people as a table"
@@ -88,7 +88,7 @@ class CurvePage(QWidget):
         self.chart.set_theme(self._theme)
         self.chart.value_moved.connect(lambda value: self._say(self.value_moved, value))
         self.chart.value_settled.connect(lambda value: self._say(self.value_settled, value))
-        self._row.insertWidget(1, self.chart, 1)
+        self._row.insertWidget(1, self.chart, 2)
         in_order(self.stops)
         self._fill()
 
@@ -228,7 +228,8 @@ class CurvePage(QWidget):
 
     def _compose(self) -> None:
         side = QWidget(self)
-        side.setFixedWidth(SIDE_PX)
+        side.setMinimumWidth(LEAST_SIDE_PX)
+        side.setMaximumWidth(SIDE_PX)
         grid = QGridLayout(side)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setSpacing(4)
@@ -243,6 +244,6 @@ class CurvePage(QWidget):
         self._row = QHBoxLayout(self)
         self._row.setContentsMargins(14, 2, 8, 6)
         self._row.setSpacing(12)
-        self._row.addWidget(side)
+        self._row.addWidget(side, 1)
         self._row.addStretch(0)
         self._show_notes()
