@@ -65,6 +65,7 @@ class CurvePage(QWidget):
         self.along = ChoiceBox("Along", "Along which covariate", self)
         self.told, self.note = QLabel(self), ElidedLabel("", self)
         self.told.setTextFormat(Qt.TextFormat.PlainText)
+        self.told.setWordWrap(True)
         self.note.setObjectName("muted")
         self.csv, self.svg = button("CSV…", CSV_TIP, "small"), button("SVG…", SVG_TIP, "small")
         self.begin = button("", "Work out what is usual among the people of the atlas", "small")
@@ -238,7 +239,8 @@ class CurvePage(QWidget):
         for row, beside in enumerate(((self.measure, self.csv), (self.along, self.svg))):
             for column, widget in enumerate(beside):
                 grid.addWidget(widget, row, column)
-        grid.addWidget(self.told, 2, 0, 1, 2, Qt.AlignmentFlag.AlignTop)
+        grid.addWidget(self.told, 2, 0, 1, 2)
+        self.told.setAlignment(Qt.AlignmentFlag.AlignTop)
         grid.addWidget(self.note, 3, 0)
         grid.addWidget(self.begin, 3, 1)
         self._row = QHBoxLayout(self)
