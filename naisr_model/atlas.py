@@ -48,6 +48,7 @@ from naisr_model.learning.fitting.posterior import (
     posterior_of,
     remaining,
     surface_deviations,
+    surface_offsets,
     volume_deviation,
 )
 from naisr_model.learning.fitting.prior import Prior, prior_of
@@ -667,6 +668,20 @@ class Individual:
         area = mesh.area / scale**2
         deviation = volume_deviation(self.posterior, points, area, self.vector, self.latent)
         return TWO_SIDED_95 * deviation * scale**3 / 1000
+
+    def surface_offsets_mm(self, points_mm: ArrayLike) -> NDArray[np.float64]:
+        """How the surface may lie along its normal at points ``[n, 3]`` on it, ``[P, n]``.
+
+        See :func:`~naisr_model.learning.fitting.posterior.surface_offsets`.
+        """
+        points = self.atlas.frame.to_model(points_mm).astype(np.float32)
+        offsets = surface_offsets(self.posterior, points, self.vector, self.latent)
+        return offsets * self.atlas.frame.scale_mm
+
+    @property
+    def noise_mm(self) -> float:
+        """Standard deviation of what the atlas cannot express of the surface."""
+        return self.posterior.noise * self.atlas.frame.scale_mm
 
     def surface_sd_mm(self, points_mm: ArrayLike) -> NDArray[np.float64]:
         """Standard deviation of the surface along its normal at points ``[n, 3]`` on it, ``[n]``."""

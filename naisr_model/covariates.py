@@ -45,6 +45,9 @@ NEIGHBOURS = 3
 AT_ONCE = 256
 """Places that are compared with all rows at a time: their distances stay in the processor's cache."""
 
+LEAST_PEOPLE = 10
+"""From the shapes of fewer nothing is said of what is usual."""
+
 LEAST_SPREAD = 0.05
 """Combinations closer than this (standard deviations) to a shape are always among the data."""
 
@@ -202,6 +205,11 @@ class Population:
     def centre(self) -> dict[str, float]:
         """Real values at which every ``c_i`` is 0."""
         return {covariate.name: covariate.centre for covariate in self.covariates}
+
+    @property
+    def tells_what_is_usual(self) -> bool:
+        """Whether there are people enough, whom the networks were fitted to, to compare others with."""
+        return int((~self.held_out).sum()) >= LEAST_PEOPLE
 
     def observed(self, name: str) -> NDArray[np.float64]:
         """Training values of one covariate in real units, ``[n_train]``."""

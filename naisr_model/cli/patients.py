@@ -163,7 +163,8 @@ def measure(
 ) -> None:
     """Measure a shape: volume, area, length and cross-sections, among people of the same covariates."""
     from naisr_model.covariates import read_values
-    from naisr_model.measures.report import measure_record, norms_of
+    from naisr_model.measures.norms import norms_of
+    from naisr_model.measures.report import measure_record
 
     if scan is None and reading != _AS_IT_LIES:
         raise InputError("--label, --scale, --align and --landmarks tell how a scan is read; add --scan FILE")

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import igl
 import numpy as np
@@ -22,26 +21,23 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtr
 
 from naisr_model.atlas import Atlas
-from naisr_model.covariates import Values
+from naisr_model.covariates import LEAST_PEOPLE, Values
 from naisr_model.errors import InputError
 from naisr_model.learning.fitting.posterior import TWO_SIDED_95
-from naisr_model.measures.curves import curve, shapes_along, template_of
-from naisr_model.measures.kinds import MEASURES, VOLUME, Measure, Surface
+from naisr_model.measures.curves import Gauge, curve, gauge_of, shapes_along
+from naisr_model.measures.kinds import VOLUME, Measure, Surface
 from naisr_model.progress import SILENT, Progress
 from naisr_model.surface.blending import blended
-
-RESOLUTION = 64
-"""Of the template that is carried to the training people: only ratios of it are used."""
 
 WIDENING = 1.1
 """Standard deviation among people whom the networks were not fitted to, over that among the training people.
 Chosen over 150 synthetic airways of another seed than those of training and ``naisr evaluate norms``."""
 
+RECONSTRUCTED, MEASURED = 0.8, 0.9
+"""Share of the work that is done then."""
+
 LEAST_DIFFERENCE = 1e-6
 """Of ratios; below it everybody is alike."""
-
-LEAST_PEOPLE = 10
-"""From fewer nothing is said of what is usual."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +46,7 @@ class People:
 
     Attributes:
         covariates: real values by name, of each.
-        template: a coarse one, ``n`` vertices.
+        template: the coarse one, ``n`` vertices.
         own_mm: their own shapes, ``[S, n, 3]``.
         usual_mm: the population's at their covariates, ``[S, n, 3]``.
     """
@@ -127,20 +123,24 @@ class Spread:
         return Norm(median, float(low), float(high), 100 * float(ndtr(z)), float(z))
 
 
-def people_of(atlas: Atlas, *, progress: Progress = SILENT) -> People:
+def people_of(atlas: Atlas, template: Surface, *, progress: Progress = SILENT) -> People:
     """Reconstruct everybody an atlas was trained on, with two cores in half a minute.
+
+    Args:
+        atlas: whose people they are.
+        template: what is carried to them: the whole of it coarse, or some points.
+        progress: told the finished share, checked between some people.
 
     Raises:
         InputError: when they are too few, where the model deforms no template, or where it folds.
         Cancelled: when nobody waits any more.
     """
     population, codes = atlas.population, atlas.checkpoint.latents
-    if len(codes) < LEAST_PEOPLE:
+    if not population.tells_what_is_usual:
         raise InputError(
             f"the atlas was trained on {len(codes)} shapes; what is usual takes {LEAST_PEOPLE} or more"
         )
     rows = [population.row(int(index)) for index in np.flatnonzero(~population.held_out)]
-    template = template_of(atlas, RESOLUTION, progress=progress.quiet)
     usual = atlas.carried_mm(template.points_mm, rows, progress=progress.part(0.0, 0.5))
     own = atlas.carried_mm(template.points_mm, rows, codes, progress=progress.part(0.5, 1.0))
     return People(tuple(rows), template, own, usual)
@@ -154,18 +154,13 @@ def spread_of(people: People, measure: Measure) -> Spread:
     """
     if not measure.is_possible(people.template):
         raise InputError(f"shapes of this atlas have no {measure.title.lower()}")
-    ratios = people.own(measure) / people.usual(measure)
+    return _spread(people.own(measure) / people.usual(measure))
+
+
+def _spread(ratios: NDArray[np.float64]) -> Spread:
     if not (ratios > 0).all() or np.ptp(ratios) < LEAST_DIFFERENCE:
         raise InputError("the atlas does not tell its people apart, so nothing is usual; train it for longer")
     return Spread(ratios)
-
-
-def dots(people: People, measure: Measure, template: Surface) -> NDArray[np.float64]:
-    """A measure of each training person, ``[S]``, as of surfaces as fine as ``template``.
-
-    What the coarse surface loses of the measure is taken for the same share of all.
-    """
-    return people.own(measure) * measure.of(template) / measure.of(people.template)
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,13 +204,16 @@ class LocalSpread:
         return atlas.sdf(points_mm, covariates) / self.sd_mm(atlas, points_mm, covariates)
 
 
-def local_spread_of(people: People) -> LocalSpread:
+def local_spread_of(people: People, *, progress: Progress = SILENT) -> LocalSpread:
     """How far the training people's surfaces lie from the population's, by the place on the template.
 
     The distance is the signed one from a point of the population's surface to the person's.
+
+    Raises:
+        Cancelled: when nobody waits any more.
     """
-    pairs = zip(people.usual_mm, people.own_mm, strict=True)
-    away = np.stack([_distances(people.template, *pair) for pair in pairs])
+    pairs = list(zip(people.usual_mm, people.own_mm, strict=True))
+    away = np.stack([_distances(people.template, *pair) for pair, _ in progress.over(pairs)])
     sizes = np.array([_size_mm(people.template.moved(points_mm)) for points_mm in people.usual_mm])
     shares = WIDENING * np.sqrt(np.mean((away / sizes[:, None]) ** 2, axis=0))
     return LocalSpread(np.asarray(people.template.points_mm), shares, people.template)
@@ -236,32 +234,21 @@ def _distances(
 
 @dataclass(frozen=True, eq=False)
 class Norms:
-    """What is usual among the people of an atlas, for every measure of :data:`~.kinds.MEASURES`.
+    """What is usual among the people of an atlas; of their shapes nothing is kept.
 
     Attributes:
         atlas: whose people they are.
-        template: as fine as the shapes that are measured.
-        people: from :func:`people_of`.
+        gauge: measures their shapes.
+        own: every measure of each training person, ``[S]``, by its name.
+        spreads: how it differs among people, by its name.
+        local: how their surfaces do.
     """
 
     atlas: Atlas
-    template: Surface
-    people: People
-
-    @cached_property
-    def spreads(self) -> dict[str, Spread]:
-        """By the name of the measure, for those that these shapes have; takes seconds."""
-        possible = {
-            name: one
-            for name, one in MEASURES.items()
-            if one.is_possible(self.template) and one.is_possible(self.people.template)
-        }
-        return {name: spread_of(self.people, one) for name, one in possible.items()}
-
-    @cached_property
-    def local(self) -> LocalSpread:
-        """Of the surface; takes seconds."""
-        return local_spread_of(self.people)
+    gauge: Gauge
+    own: Mapping[str, NDArray[np.float64]]
+    spreads: Mapping[str, Spread]
+    local: LocalSpread
 
     def usual(self, covariates: Values) -> dict[str, float]:
         """Every measure of the population's shape at some covariates.
@@ -269,8 +256,8 @@ class Norms:
         Raises:
             InputError: for an unknown covariate or one out of range.
         """
-        (shape,) = shapes_along(self.atlas, self.template, [covariates])
-        return {name: MEASURES[name].of(shape) for name in self.spreads}
+        (shape,) = shapes_along(self.atlas, self.gauge.fine, [covariates])
+        return {name: one.of(shape) for name, one in self.gauge.measures.items()}
 
     def norms(self, covariates: Values, values: Mapping[str, float]) -> dict[str, Norm]:
         """Where values stand among people of the same covariates, by the name of the measure.
@@ -280,3 +267,21 @@ class Norms:
         """
         usual = self.usual(covariates)
         return {name: self.spreads[name].norm(values[name], usual[name]) for name in usual if name in values}
+
+
+def norms_of(atlas: Atlas, *, progress: Progress = SILENT) -> Norms:
+    """What is usual among the people of an atlas; takes the better part of a minute.
+
+    Raises:
+        InputError: when they are too few or all alike, where the model deforms no template, or where it
+            folds.
+        Cancelled: when nobody waits any more.
+    """
+    gauge = gauge_of(atlas, progress=progress.quiet)
+    people = people_of(atlas, gauge.coarse, progress=progress.part(0.0, RECONSTRUCTED))
+    own, usual = (
+        gauge.curves([people.template.moved(points_mm) for points_mm in shapes], progress=progress.quiet)
+        for shapes in (people.own_mm, people.usual_mm)
+    )
+    spreads = {name: _spread(own[name] / usual[name]) for name in own}
+    return Norms(atlas, gauge, own, spreads, local_spread_of(people, progress=progress.part(MEASURED, 1.0)))

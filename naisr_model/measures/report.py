@@ -7,24 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from naisr_model.atlas import VOLUME_RESOLUTION, Atlas, Individual
+from naisr_model.atlas import Individual
 from naisr_model.covariates import Values
 from naisr_model.learning.fitting.posterior import TWO_SIDED_95
-from naisr_model.measures.curves import shapes_along, template_of
-from naisr_model.measures.kinds import MEASURES, Surface, measured
-from naisr_model.measures.norms import Norms, people_of
-from naisr_model.progress import SILENT, Progress
-
-
-def norms_of(atlas: Atlas, *, progress: Progress = SILENT) -> Norms:
-    """What is usual among the people of an atlas; takes half a minute.
-
-    Raises:
-        InputError: when they are too few, where the model deforms no template, or where it folds.
-        Cancelled: when nobody waits any more.
-    """
-    template = template_of(atlas, VOLUME_RESOLUTION, progress=progress.quiet)
-    return Norms(atlas, template, people_of(atlas, progress=progress))
+from naisr_model.measures.curves import shapes_along
+from naisr_model.measures.kinds import Surface, measured
+from naisr_model.measures.norms import Norms
 
 
 def measure_record(norms: Norms, covariates: Values, person: Individual | None = None) -> dict[str, Any]:
@@ -44,12 +32,12 @@ def measure_record(norms: Norms, covariates: Values, person: Individual | None =
         InputError: for an unknown covariate or one out of range.
     """
     atlas = norms.atlas
-    (shape,) = shapes_along(atlas, norms.template, [covariates], person)
+    (shape,) = shapes_along(atlas, norms.gauge.fine, [covariates], person)
     values = {name: value for name, value in measured(shape).items() if name in norms.spreads}
     found = norms.norms(covariates, values)
     rows = {
         name: {"value": values[name], "unit": one.unit, "definition": one.definition, **asdict(found[name])}
-        for name, one in MEASURES.items()
+        for name, one in norms.gauge.measures.items()
         if name in found
     }
     record: dict[str, Any] = {"covariates": atlas.complete(covariates), "measures": rows}

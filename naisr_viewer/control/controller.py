@@ -28,6 +28,7 @@ from naisr_viewer.files.exports import in_the_way, planned
 from naisr_viewer.panels.kinds import with_layout_of
 from naisr_viewer.panels.scales import fitted_limit, scale_of
 from naisr_viewer.state.atlas_card import AtlasCard
+from naisr_viewer.state.curves import CurveChoice
 from naisr_viewer.state.drawer import Tab
 from naisr_viewer.state.explorer import (
     ExplorerState,
@@ -227,6 +228,10 @@ class Controller(QObject):
         """Open a page beneath the shapes; None, or the page that is open, closes it."""
         self.go(replace(self.state, drawer=None if tab is self.state.drawer else tab))
 
+    def set_curve(self, curve: CurveChoice) -> None:
+        """Show another curve in the drawer."""
+        self.go(replace(self.state, curve=curve))
+
     def set_quantity(self, quantity: Quantity) -> None:
         """Colour the surfaces by something else."""
         self._see(replace(self.state.overlay, quantity=quantity))
@@ -347,7 +352,7 @@ class Controller(QObject):
     def _finish_move(self) -> None:
         """Something else comes; a movement that has not come to rest ends where it is."""
         self._window.shapes.set_moving(False)
-        self._window.covariates.forget_moves()
+        self._window.forget_moves()
         if self._before_move is not None:
             before, self._before_move = self._before_move, None
             self._timeline.record(before, self.state)

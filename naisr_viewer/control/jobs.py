@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from threading import Event
 
 from naisr_model.progress import Progress
 from naisr_viewer.control.worker import Deliver, Job
 from naisr_viewer.engine.atlases import Read
 from naisr_viewer.engine.clinic import Clinic
-from naisr_viewer.engine.engine import Engine
+from naisr_viewer.engine.curves import curves, standings
+from naisr_viewer.engine.engine import POLL_S, Engine
 from naisr_viewer.engine.ledgers import ledger, origin_mm
 from naisr_viewer.engine.sessions import Restored, completed, restored
 from naisr_viewer.files.exports import Planned
@@ -19,6 +21,7 @@ from naisr_viewer.files.matrix import MatrixPlan, figure_of, write_matrix
 from naisr_viewer.files.sessions import write_session
 from naisr_viewer.files.surfaces import require_writable, write_surface
 from naisr_viewer.state.atlas_card import AtlasCard
+from naisr_viewer.state.curves import CurveRequest, Curves, Standing
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Panel
 from naisr_viewer.state.patients import Fitted, Labels, Named, Reading, Scan
@@ -150,3 +153,28 @@ def pinning(engine: Engine, surface: SurfaceRequest, point_mm: Point) -> Job[Poi
 def telling(engine: Engine, request: LedgerRequest) -> Job[Ledger]:
     """Finds the pinned places and what moved them."""
     return lambda deliver, _progress: deliver(ledger(engine, request))
+
+
+def measuring(engine: Engine, request: CurveRequest) -> Job[Curves]:
+    """Measures along a covariate."""
+    return lambda deliver, progress: deliver(curves(engine, request, progress))
+
+
+def reckoning(engine: Engine, path: Path, at_rest: Event) -> Job[bool]:
+    """Finds what is usual among the people of an atlas, unless a hand moves; hands over that it did."""
+
+    def job(deliver: Deliver[bool], progress: Progress) -> None:
+        def is_unwanted() -> bool:
+            while not (progress.is_unwanted() or at_rest.wait(POLL_S)):
+                pass
+            return progress.is_unwanted()
+
+        engine.norms(path, replace(progress, is_unwanted=is_unwanted))
+        deliver(True)
+
+    return job
+
+
+def standing(engine: Engine, path: Path, person: int) -> Job[tuple[Standing, ...]]:
+    """Finds where a patient stands among people."""
+    return lambda deliver, progress: deliver(standings(engine, path, person, progress))

@@ -31,6 +31,8 @@ from naisr_viewer.state.layouts import FULL_SHAPE, TEMPLATE
 from naisr_viewer.state.requests import EXACT_RESOLUTION, Origin, SurfaceRequest, SurfaceResult
 
 if TYPE_CHECKING:
+    from naisr_model.atlas import Atlas
+    from naisr_model.measures.norms import Norms
     from naisr_model.surface.displacements import DisplacementTables
 
 KEPT_FILES = 8
@@ -38,6 +40,7 @@ KEPT_FILES = 8
 
 OPENING = "opening.npz"
 DISPLACEMENTS = "displacements.safetensors"
+NORMS = "norms.safetensors"
 """Endings of what is kept."""
 
 PROGRAM = (Path(errors.__file__).parent, Path(naisr_viewer.__file__).parent)
@@ -126,6 +129,22 @@ class Cache:
         with contextlib.suppress(InputError, OSError):
             tables.save(self._file(fingerprint, DISPLACEMENTS))
             self._forget_oldest(DISPLACEMENTS)
+
+    def norms(self, fingerprint: str, atlas: Atlas) -> Norms | None:
+        """What is usual among the people of an atlas, or None where nothing of use is kept."""
+        from naisr_model.measures.kept import load_norms
+
+        with contextlib.suppress(InputError):
+            return load_norms(self._file(fingerprint, NORMS), atlas)
+        return None
+
+    def keep_norms(self, fingerprint: str, norms: Norms) -> None:
+        """For the next run."""
+        from naisr_model.measures.kept import save_norms
+
+        with contextlib.suppress(InputError, OSError):
+            save_norms(norms, self._file(fingerprint, NORMS))
+            self._forget_oldest(NORMS)
 
     def _file(self, fingerprint: str, ending: str) -> Path:
         return self._folder / f"{fingerprint}.{ending}"

@@ -17,6 +17,7 @@ from naisr_viewer.engine.answers.base import Who
 from naisr_viewer.engine.answers.kinds import ANSWERS
 from naisr_viewer.engine.atlases import Atlases, Opened, Read, load_atlas
 from naisr_viewer.engine.cache import Cache, Opening, cache_folder, first_picture
+from naisr_viewer.engine.norms import KnownNorms
 from naisr_viewer.engine.people import FittedPerson
 from naisr_viewer.engine.previews import Previews
 from naisr_viewer.state.atlas_card import AtlasCard
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     import trimesh
 
     from naisr_model.atlas import Atlas
+    from naisr_model.measures.curves import Gauge
+    from naisr_model.measures.norms import Norms
     from naisr_model.surface.displacements import DisplacementTables
     from naisr_model.surface.tracking import Tracker
 
@@ -53,6 +56,7 @@ class Engine:
         self._persons = count(1)
         self._results: OrderedDict[SurfaceRequest, SurfaceResult] = OrderedDict()
         self.previews = Previews()
+        self._usual = KnownNorms(self._cache)
 
     def open(self, path: Path) -> AtlasCard:
         """Read ``path`` afresh and describe it.
@@ -77,6 +81,7 @@ class Engine:
             closed = self._atlases.begin(opened, atlas)
             self._people = {key: each for key, each in self._people.items() if each.atlas not in closed}
             self._forget_surfaces(lambda atlas, _: atlas in closed)
+            self._usual.forget(closed)
             if opened.picture is not None:
                 self._results[opened.picture.request] = opened.picture
         return opened.card
@@ -104,6 +109,28 @@ class Engine:
             InputError: when the file has been replaced since it was opened.
         """
         return self._atlases.network(path)
+
+    def gauge(self, path: Path) -> Gauge:
+        """What measures the shapes of an open atlas.
+
+        Raises:
+            InputError: where there is nothing to measure, or the file has been replaced since it was opened.
+        """
+        return self._usual.gauge(self._atlases[path], self.atlas(path))
+
+    def known_norms(self, path: Path) -> Norms | None:
+        """What is usual among the people of an open atlas, once :meth:`norms` has found it; instant."""
+        return self._usual.known(self._atlases[path])
+
+    def norms(self, path: Path, progress: Progress = SILENT) -> Norms:
+        """What is usual among the people of an open atlas: from the disk, or in the better part of a minute.
+
+        Raises:
+            InputError: when they are too few or all alike, where the model folds, or when the file has been
+                replaced since it was opened.
+            Cancelled: when nobody waits any more.
+        """
+        return self._usual.find(self._atlases[path], self.atlas(path), progress)
 
     def admit(self, fitted: FittedPerson) -> int:
         """Answer for someone who was fitted, too; returns the number that requests name the person by."""

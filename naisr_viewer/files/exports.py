@@ -76,8 +76,8 @@ def file_stem(
     words = "-".join([atlas.name, *_plain_names(owner), title_of(view)]).lower()
     parts = [words, *_values(atlas, request.values)]
     if request.before is not None:
-        other = reference if reference is not owner else None
-        parts += ["-".join(["since", *_plain_names(other)]), *_values(atlas, request.before[1])]
+        parts += ["-".join(["since", *_since(request.before[0], owner, reference)])]
+        parts += _values(atlas, request.before[1])
     return _short("_".join(STRANGE.sub("-", part).strip("-") for part in parts))
 
 
@@ -89,6 +89,13 @@ def matrix_stem(state: ExplorerState) -> str:
     words = "-".join([state.atlas.name, *_plain_names(owner), "matrix"]).lower()
     parts = [words, state.matrix.across.covariate, state.matrix.down.covariate]
     return _short("_".join(STRANGE.sub("-", part).strip("-") for part in parts))
+
+
+def _since(person: int, owner: OpenScan | None, reference: OpenScan | None) -> list[str]:
+    """Whom a change is counted from, where that is not its owner."""
+    if not person:
+        return ["average"]
+    return _plain_names(reference if reference is not owner else None)
 
 
 def _resolution(panel: Panel, choice: ExportChoice) -> int:

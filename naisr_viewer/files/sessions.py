@@ -82,11 +82,11 @@ def _converter(folder: Path) -> Converter:
     converter.register_unstructure_hook(
         ExplorerState,
         make_dict_unstructure_fn(
-            ExplorerState, converter, atlas=absent, patients=absent, is_atlas_changed=absent
+            ExplorerState, converter, atlas=absent, patients=absent, has_norms=absent, is_atlas_changed=absent
         ),
     )
     as_state = make_dict_structure_fn(
-        ExplorerState, converter, atlas=absent, patients=absent, is_atlas_changed=absent
+        ExplorerState, converter, atlas=absent, patients=absent, has_norms=absent, is_atlas_changed=absent
     )
     converter.register_structure_hook(ExplorerState, lambda value, kind: as_state(_record_of(value), kind))
     converter.register_unstructure_hook(Path, lambda path: _beneath(path, folder))

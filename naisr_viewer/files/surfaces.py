@@ -116,7 +116,7 @@ def description(
         "volume_of_triangles_cm3": round(_triangles(result).volume / 1000, 4) if len(result.faces) else None,
         "volume_95_percent_margin_cm3": None if margin is None else round(margin, 4),
         "numbers": _numbers_record(result, format_named(Path(file_name))),
-        "patient": None if patient is None else _patient_record(patient),
+        "patient": None if patient is None else patient_record(patient),
         "before": _before_record(request, atlas, reference),
         "vertices": len(result.points_mm),
         "triangles": len(result.faces),
@@ -156,7 +156,7 @@ def _before_record(
     if request.before is None:
         return None
     record = {"covariates": _covariate_records(atlas, dict(request.before[1]))}
-    return record | {"patient": None if reference is None else _patient_record(reference)}
+    return record | {"patient": None if reference is None else patient_record(reference)}
 
 
 def _covariate_records(atlas: AtlasCard, given: Mapping[str, float]) -> dict[str, Any]:
@@ -181,7 +181,7 @@ def _is_missed(patient: OpenScan | None) -> bool:
     return patient is not None and patient.fit is not None and not patient.fit.is_valid
 
 
-def _patient_record(patient: OpenScan) -> dict[str, Any]:
+def patient_record(patient: OpenScan) -> dict[str, Any]:
     """Who it is, and what of the covariates is known of them; the rest was inferred."""
     fit = patient.fit
     return {

@@ -11,7 +11,8 @@ def _ask(state: ExplorerState, panel: Panel, resolution: int) -> SurfaceRequest:
     reference = state.reference
     if reference is None:
         return asked(state, panel, resolution, (), state.person)
-    return asked(state, panel, resolution, reference.values, reference.person)
+    person, values = reference
+    return asked(state, panel, resolution, values, person)
 
 
 KIND = PanelKind(

@@ -20,9 +20,7 @@ DOUBTFUL = Caption(
 
 
 def _ask(state: ExplorerState, panel: Panel, resolution: int) -> SurfaceRequest:
-    reference = state.reference
-    before = None if reference is None else (reference.person, reference.values)
-    return asked(state, panel, resolution, state.named, state.person, before)
+    return asked(state, panel, resolution, state.named, state.person, state.reference)
 
 
 def _gain(result: SurfaceResult) -> Caption:

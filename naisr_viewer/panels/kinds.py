@@ -16,6 +16,7 @@ from naisr_viewer.panels import (
     shape,
     template,
     uncertainty,
+    unusual,
 )
 from naisr_viewer.panels.base import PanelKind
 from naisr_viewer.state.atlas_card import AtlasCard
@@ -35,6 +36,7 @@ KINDS: dict[str, PanelKind] = {
         scan.KIND,
         uncertainty.KIND,
         deviation.KIND,
+        unusual.KIND,
         change.KIND,
         scans.KIND,
         matrix.KIND,

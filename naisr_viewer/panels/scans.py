@@ -24,7 +24,7 @@ def _is_there(state: ExplorerState, _panel: Panel) -> bool:
 
 
 def _ask(state: ExplorerState, panel: Panel, resolution: int) -> SurfaceRequest:
-    before = None if state.reference is None else (state.reference.person, ())
+    before = None if state.reference is None else (state.reference[0], ())
     return asked(state, panel, resolution, (), state.person, before)
 
 

@@ -20,6 +20,7 @@ from naisr_viewer.control.controller import Controller
 from naisr_viewer.program import start
 from naisr_viewer.program.display import ensure_display
 from naisr_viewer.program.headless import finish, take_screenshot
+from naisr_viewer.state.drawer import Tab
 from naisr_viewer.state.explorer import ExplorerState, opened, with_values
 from naisr_viewer.state.layouts import FULL_SHAPE, Layout
 from naisr_viewer.state.overlay import Quantity
@@ -69,6 +70,8 @@ def main(folder: Path) -> None:
         take_screenshot(window, controller, pictures / "scans.png")
         controller.begin(first)
         _fit(window, controller, child)
+        window.patients.reveal_standings()
+        take_screenshot(window, controller, pictures / "usual.png")
         controller.set_follow(True)
         controller.set_layout(Layout.CHANGE)
         controller.settle("age", dict(controller.state.named)["age"] + LATER_MONTHS)
@@ -102,10 +105,17 @@ def _lay_out(_window: MainWindow, controller: Controller) -> None:
     controller.set_layout(Layout.MATRIX)
 
 
+def _show_curve(window: MainWindow, controller: Controller) -> None:
+    """How the volume changes with age."""
+    controller.set_drawer(Tab.CURVE)
+    finish(window, controller)
+
+
 SCENES = {
     "point": _pin_three_places,
     "support": _go_where_nobody_is,
     "maps": _show_maps,
+    "curve": _show_curve,
     "matrix": _lay_out,
 }
 """The pictures of the user guide, by name; each scene starts from what ``window.png`` shows."""

@@ -113,6 +113,7 @@ def make_window(
     from naisr_viewer.control.controller import Controller
     from naisr_viewer.control.desk import PatientDesk
     from naisr_viewer.control.matrix import MatrixDesk
+    from naisr_viewer.control.measuring import CurveDesk, NormsDesk
     from naisr_viewer.control.pinning import PinDesk
     from naisr_viewer.control.preferences import Preferences
     from naisr_viewer.control.sessions import SessionDesk
@@ -130,6 +131,8 @@ def make_window(
     PatientDesk(window, controller, clinic)  # the controller owns it
     AtlasWatch(controller)  # and this
     PinDesk(window, controller, engine, Worker(), Worker())  # and this
+    CurveDesk(window, controller, engine, Worker())  # and this
+    NormsDesk(window, controller, engine, Worker())  # and this
     SessionDesk(window, controller, engine, clinic, Worker(), Worker(), kept)  # and this
     MatrixDesk(window, controller, engine)  # and this
     return window, controller

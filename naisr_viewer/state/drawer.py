@@ -11,8 +11,11 @@ class Tab(StrEnum):
     """One page of the drawer."""
 
     POINT = "point"
+    CURVE = "curve"
 
 
 def tabs_of(atlas: AtlasCard) -> tuple[Tab, ...]:
     """The pages that have something to tell of an atlas."""
-    return (Tab.POINT,) if atlas.capabilities.trackable else ()
+    if not atlas.capabilities.trackable:
+        return ()
+    return tuple(tab for tab in Tab if tab is not Tab.CURVE or atlas.covariates)

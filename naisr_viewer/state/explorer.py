@@ -8,6 +8,7 @@ import numpy as np
 
 from naisr_model.covariates import growth_path
 from naisr_viewer.state.atlas_card import AtlasCard, RealVector
+from naisr_viewer.state.curves import FIRST_CURVE, CurveChoice
 from naisr_viewer.state.drawer import Tab, tabs_of
 from naisr_viewer.state.layouts import Cell, Layout
 from naisr_viewer.state.matrix import Matrix, first_matrix, values_at
@@ -15,6 +16,9 @@ from naisr_viewer.state.overlay import NOTHING_SHOWN, Overlay
 from naisr_viewer.state.patients import Fitted, Named, OpenScan
 from naisr_viewer.state.pins import Pin, Point, with_pin
 from naisr_viewer.state.support import NOTHING_CHOSEN, Support, suited
+
+AVERAGE_KEY = 0
+"""Stands among the keys of patients for the population's average."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +32,8 @@ class ExplorerState:
         follow: whether the other covariates follow one that is moved, as they do in the population.
         patients: the scans that are open.
         patient: key of the one that is shown; None for the population average.
-        compared: key of the one that is compared with; None for the patient as fitted.
+        compared: key of the one that is compared with; None for the patient as fitted,
+            :data:`AVERAGE_KEY` for the population's average at the same covariates.
         has_ghost: whether the scan is drawn over the full shape.
         pins: places that are marked in all shapes, and told of.
         matrix: what shapes are laid out by in that layout; None where there are no two covariates.
@@ -37,6 +42,8 @@ class ExplorerState:
         touched: the covariate that was moved last; empty before.
         drawer: the page that is open beneath the shapes; None where it is closed.
         support: over which covariates the data behind the atlas are shown.
+        curve: which curve the drawer shows.
+        has_norms: whether it is known what is usual among the people of the atlas.
         is_atlas_changed: whether the file of the atlas has changed on the disk since it was read.
     """
 
@@ -55,6 +62,8 @@ class ExplorerState:
     touched: str = ""
     drawer: Tab | None = None
     support: Support = NOTHING_CHOSEN
+    curve: CurveChoice = FIRST_CURVE
+    has_norms: bool = False
     is_atlas_changed: bool = False
 
     @property
@@ -79,10 +88,13 @@ class ExplorerState:
         return self.shown.fit if self.shown else None
 
     @property
-    def reference(self) -> Fitted | None:
-        """The fit that is compared with."""
+    def reference(self) -> tuple[int, Named] | None:
+        """The person that is compared with, and at which covariates; None where there is no fit."""
+        if self.compared == AVERAGE_KEY and self.fit is not None:
+            return 0, self.named
         other = self.find(self.compared)
-        return other.fit if other and other.fit and other.fit.is_valid else self.fit
+        fit = other.fit if other and other.fit and other.fit.is_valid else self.fit
+        return None if fit is None else (fit.person, fit.values)
 
     @property
     def person(self) -> int:
@@ -130,6 +142,7 @@ def opened(state: ExplorerState, atlas: AtlasCard) -> ExplorerState:
         matrix=first_matrix(atlas),
         drawer=drawer,
         support=suited(state.support, atlas),
+        curve=CurveChoice(state.curve.measure),
     )
 
 
@@ -224,6 +237,11 @@ def pinned(state: ExplorerState, origin_mm: Point) -> ExplorerState:
 def without_pins(state: ExplorerState) -> ExplorerState:
     """No place pinned, and nothing told of any."""
     return replace(state, pins=(), drawer=None if state.drawer is Tab.POINT else state.drawer)
+
+
+def knowing_norms(state: ExplorerState) -> ExplorerState:
+    """It is known what is usual among the people of the atlas."""
+    return replace(state, has_norms=True)
 
 
 def with_possible_layout(state: ExplorerState) -> ExplorerState:

@@ -45,6 +45,7 @@ class SurfaceRequest:
         person: whose code; 0 for the population average.
         before: of a change, person and covariate values that it is counted from.
         map: what is shown on it, point by point; None for nothing.
+        is_judged: whether it is compared with what is usual, which is known then.
     """
 
     atlas: Path
@@ -54,6 +55,7 @@ class SurfaceRequest:
     person: int = 0
     before: tuple[int, Named] | None = None
     map: Map | None = None
+    is_judged: bool = False
 
 
 @dataclass(frozen=True, eq=False)

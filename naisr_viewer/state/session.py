@@ -7,7 +7,7 @@ from pathlib import Path
 
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.camera import Camera
-from naisr_viewer.state.explorer import ExplorerState, with_possible_layout
+from naisr_viewer.state.explorer import AVERAGE_KEY, ExplorerState, with_possible_layout
 from naisr_viewer.state.matrix import kept_matrix
 from naisr_viewer.state.patients import Named, OpenScan, Reading
 from naisr_viewer.state.support import suited
@@ -84,7 +84,7 @@ def session_of(state: ExplorerState, camera: Camera | None, window_px: tuple[int
     assert state.atlas is not None
     return Session(
         SavedAtlas(state.atlas.path),
-        replace(state, atlas=None, patients=(), is_atlas_changed=False),
+        replace(state, atlas=None, patients=(), has_norms=False, is_atlas_changed=False),
         tuple(_saved(each) for each in state.patients),
         camera,
         window_px,
@@ -102,7 +102,7 @@ def state_of(session: Session, card: AtlasCard, patients: tuple[OpenScan, ...]) 
             patients=patients,
             matrix=kept_matrix(card, state.matrix),
             patient=state.patient if state.patient in keys else None,
-            compared=state.compared if state.compared in keys else None,
+            compared=state.compared if state.compared in keys | {AVERAGE_KEY} else None,
             support=suited(state.support, card),
         )
     )

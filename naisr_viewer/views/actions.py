@@ -172,7 +172,10 @@ def _document(title: str, page: str, *keys: str) -> Command:
 
 
 LAYOUTS = tuple(_layout(layout, number) for number, layout in enumerate(Layout, start=1))
-DRAWER = (_drawer(Tab.POINT, "Ctrl+Shift+P", "What each covariate does to the places that are pinned"),)
+DRAWER = (
+    _drawer(Tab.POINT, "Ctrl+Shift+P", "What each covariate does to the places that are pinned"),
+    _drawer(Tab.CURVE, "Ctrl+Shift+C", "How volume, length and other measures change along a covariate"),
+)
 LOOKS = tuple(_look(direction, number) for number, direction in enumerate(DIRECTIONS, start=1))
 DOCUMENTS = (
     _document("User guide", "user-guide.md", "F1"),

@@ -7,6 +7,7 @@ from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 
 from naisr_viewer.state.drawer import Tab
 from naisr_viewer.views.changed_bar import ChangedBar
+from naisr_viewer.views.curve_page import CurvePage
 from naisr_viewer.views.drawer import Drawer
 from naisr_viewer.views.empty_page import EmptyPage
 from naisr_viewer.views.error_bar import ErrorBar
@@ -34,7 +35,8 @@ class Centre(QWidget):
         self.maps = MapBar(self)
         self.matrix = MatrixBar(self)
         self.ledger = LedgerPage(self)
-        self.drawer = Drawer({Tab.POINT: self.ledger}, self)
+        self.curve = CurvePage(self)
+        self.drawer = Drawer({Tab.POINT: self.ledger, Tab.CURVE: self.curve}, self)
         self._shapes = shapes
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         column = QVBoxLayout(self)
@@ -62,7 +64,7 @@ class Centre(QWidget):
     @property
     def drawer_stops(self) -> list[QWidget]:
         """The same below the shapes."""
-        return [*self.drawer.stops, self.ledger]
+        return [*self.drawer.stops, self.ledger, *self.curve.stops]
 
     def show_shapes(self, is_open: bool) -> None:
         """Show the shapes where an atlas is open, else the empty page."""

@@ -20,6 +20,9 @@ from naisr_viewer.state.drawer import Tab
 PAGE_PX = 144
 """Height of an open page; with the tabs above it the drawer takes some 170."""
 
+LEAST_TAB_PX = 36
+"""Of a narrow window's."""
+
 
 class Drawer(QFrame):
     """A row of tabs, and the page whose tab is chosen.
@@ -46,6 +49,7 @@ class Drawer(QFrame):
         self.cross.clicked.connect(lambda: self.tab_requested.emit(None))
         self._stack = QStackedWidget(self)
         self._stack.setFixedHeight(PAGE_PX)
+        self._stack.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)  # no page widens it
         for page in pages.values():
             self._stack.addWidget(page)
         self._compose()
@@ -77,6 +81,7 @@ class Drawer(QFrame):
         button = QToolButton(self)
         button.setText(tab.capitalize())
         button.setCheckable(True)
+        button.setMinimumWidth(LEAST_TAB_PX)
         button.clicked.connect(lambda: self._press(tab))
         return button
 

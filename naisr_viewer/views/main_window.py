@@ -15,6 +15,7 @@ from naisr_viewer.panels.kinds import visible_panels
 from naisr_viewer.panels.maps import can_map, words_of_maps
 from naisr_viewer.panels.matrix import here
 from naisr_viewer.panels.scales import scale_of
+from naisr_viewer.state.curves import Curves, Reckoning, Standing
 from naisr_viewer.state.drawer import Tab, tabs_of
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Layout
@@ -40,6 +41,7 @@ from naisr_viewer.views.dialogs.about import about
 from naisr_viewer.views.dialogs.documents import DocumentWindow
 from naisr_viewer.views.dialogs.export import ExportDialog
 from naisr_viewer.views.dialogs.files import (
+    ask_curve_place,
     ask_image_path,
     ask_open_path,
     ask_scan_path,
@@ -93,6 +95,9 @@ class MainWindow(QMainWindow):
     shared_toggled = Signal(bool)  # whether all surfaces with numbers of one unit share its scale
     unpin_requested = Signal()  # Edit > Remove pins
     drawer_requested = Signal(object)  # a Tab of the drawer, or None to close it
+    curve_requested = Signal(object)  # a CurveChoice: another measure, or along another covariate
+    curve_place_chosen = Signal(Path)  # where the curve shall go
+    reckoning_requested = Signal(bool)  # whether it shall be worked out what is usual, or that be stopped
     theme_requested = Signal(object)  # a ThemeChoice from the View menu
     cancel_requested = Signal()  # the cancel button beside the progress bar
     about_requested = Signal()  # Help > About
@@ -143,6 +148,7 @@ class MainWindow(QMainWindow):
             name = state.atlas.path.name if state.atlas and state.is_atlas_changed else ""
             self._centre.changed.show_changed(name)
         self._centre.drawer.show_tab(state.drawer)
+        self._centre.curve.show_state(state)
         self.scale.setVisible(state.atlas is not None)
         self.covariates.show_values(state)
         self.patients.show_state(state)
@@ -213,6 +219,27 @@ class MainWindow(QMainWindow):
             {panel: [(point, pin_colour(number)) for number, point in found] for panel, found in places}
         )
 
+    def show_curves(self, curves: Curves | None, is_measuring: bool = False, trouble: str = "") -> None:
+        """Show how measures change along a covariate, see :meth:`CurvePage.show_curves`."""
+        self._centre.curve.show_curves(curves, is_measuring, trouble)
+
+    def show_reckoning(self, reckoning: Reckoning) -> None:
+        """Say how far it is known what is usual among the people of the atlas."""
+        self._centre.curve.show_reckoning(reckoning)
+
+    def show_standings(self, standings: Sequence[Standing]) -> None:
+        """Say where the measures of the patient that is shown stand among people; none takes that away."""
+        self.patients.show_standings(standings)
+
+    def curve_picture(self) -> bytes:
+        """The curve that is shown as SVG; there is one."""
+        return self._centre.curve.picture()
+
+    def forget_moves(self) -> None:
+        """Say no more of movements that have not come to rest."""
+        self.covariates.forget_moves()
+        self._centre.curve.forget_move()
+
     def show_recent(self, paths: Sequence[Path]) -> None:
         """Fill File > Open recent."""
         self._recent.show_files(paths)
@@ -226,6 +253,7 @@ class MainWindow(QMainWindow):
         self.covariates.set_theme(theme)
         self.shapes.set_theme(theme)
         self._centre.ledger.set_theme(theme)
+        self._centre.curve.set_theme(theme)
         self.scale.update()
         self._actions[f"theme {choice}"].setChecked(True)
 
@@ -318,6 +346,12 @@ class MainWindow(QMainWindow):
         if path is not None:
             self.session_place_chosen.emit(path)
 
+    def _ask_curve_place(self, ending: str) -> None:
+        """Let a place be chosen for the curve."""
+        path = ask_curve_place(self, self._state, ending)
+        if path is not None:
+            self.curve_place_chosen.emit(path)
+
     def ask_screenshot(self) -> None:
         """Let a place be chosen for a picture."""
         path = ask_image_path(self, self._state)
@@ -394,6 +428,7 @@ class MainWindow(QMainWindow):
         self._centre.maps.shared_toggled.connect(self.shared_toggled)
         self._centre.drawer.tab_requested.connect(self.drawer_requested)
         self._centre.matrix.changed.connect(self.matrix_requested)
+        self._connect_curve()
         self.patients.open_requested.connect(self.ask_scan)
         self.cancel.clicked.connect(self.cancel_requested)
         self.shapes.scale_changed.connect(self.scale.set_scale)
@@ -401,10 +436,19 @@ class MainWindow(QMainWindow):
         self.shapes.drawn.connect(self._prepare_charts, Qt.ConnectionType.QueuedConnection)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._system_theme_changed)
 
+    def _connect_curve(self) -> None:
+        curve = self._centre.curve
+        curve.choice_requested.connect(self.curve_requested)
+        curve.value_moved.connect(self.covariates.value_moved)  # dragging its line is dragging the slider
+        curve.value_settled.connect(self.covariates.value_settled)
+        curve.save_requested.connect(self._ask_curve_place)
+        curve.reckoning_requested.connect(self.reckoning_requested)
+
     def _prepare_charts(self) -> None:
         """Once, after the first picture."""
         if self.covariates.support.chart is None:
             self.covariates.support.prepare()
+            self._centre.curve.prepare()
             in_order(self._stops)
 
     def _system_theme_changed(self) -> None:

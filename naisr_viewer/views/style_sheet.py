@@ -84,12 +84,13 @@ def style_sheet(theme: Theme) -> str:
     #mapBar QToolButton:checked {{ background: {t.accent}; color: {t.on_accent}; border-color: {t.accent}; }}
     #mapBar QToolButton:checked:focus {{ border-color: {t.text}; }}
     #drawer {{ background: {t.window}; border-top: 1px solid {t.line}; }}
-    #drawer QToolButton {{ border: 1px solid transparent; border-radius: 4px; padding: 1px 10px;
+    #drawer QToolButton {{ border: 1px solid transparent; border-radius: 4px; padding: 1px 6px;
                 color: {t.muted}; background: transparent; }}
     #drawer QToolButton:hover, #drawer QToolButton:focus {{ border-color: {t.accent}; }}
     #drawer QToolButton:checked {{ color: {t.text}; background: {t.line}; font-weight: 600; }}
     #chart {{ border: 1px solid {t.line}; border-radius: 5px; }}
     #chart:focus {{ border-color: {t.accent}; }}
+    #small {{ padding: 2px 8px; }}
     #fold {{ border: 1px solid transparent; border-radius: 4px; font-weight: 600; padding: 2px; }}
     #fold:focus {{ border-color: {t.accent}; }}
     #section {{ font-size: 11pt; font-weight: 600; }}

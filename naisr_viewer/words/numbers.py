@@ -98,7 +98,8 @@ def gained(cm3: float, before_cm3: float, margin_cm3: float | None = None) -> st
         digits = min(digits, 1 - math.floor(math.log10(margin_cm3)))
     percent = 100 * difference / before_cm3 if before_cm3 else 0.0
     share = f" ({percent:+.{1 if abs(percent) < 9.5 else 0}f}\u00a0%)" if before_cm3 else ""
-    return f"{round(difference, digits):+,.{max(0, digits)}f} cm³{share}".replace("-", "−")
+    # Adding 0 leaves no minus before nothing.
+    return f"{round(difference, digits) + 0.0:+,.{max(0, digits)}f} cm³{share}".replace("-", "−")
 
 
 def capitalised(text: str) -> str:

@@ -19,8 +19,7 @@ from naisr_model.evaluation.studies.calibration import NewPatient, new_patients,
 from naisr_model.learning.fitting.posterior import TWO_SIDED_95
 from naisr_model.measures.curves import shapes_along
 from naisr_model.measures.kinds import MEASURES, measured
-from naisr_model.measures.norms import Norms
-from naisr_model.measures.report import norms_of
+from naisr_model.measures.norms import Norms, norms_of
 from naisr_model.progress import SILENT, Progress
 
 SCAN = "volume of the scan"
@@ -59,7 +58,7 @@ class NormsStudy:
         mesh_mm, values = aligned(atlas, *known_population(atlas).visit_shape(visit)), dict(visit.values)
         fit = atlas.fit(mesh_mm, values, progress=progress)
         usual, own = (
-            shapes_along(atlas, norms.template, [values], person)[0] for person in (None, fit.individual)
+            shapes_along(atlas, norms.gauge.fine, [values], person)[0] for person in (None, fit.individual)
         )
         found = norms.norms(values, measured(own)) | {
             SCAN: norms.norms(values, {"volume": mesh_mm.volume / 1000})["volume"]

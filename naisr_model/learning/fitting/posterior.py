@@ -131,6 +131,18 @@ def moved(posterior: Posterior, covariates: Vector) -> Posterior:
     return Posterior(covariates, problem, code, code, posterior.noise)
 
 
+def surface_offsets(
+    posterior: Posterior, points: NDArray[np.float32], covariates: Vector, latent: Vector
+) -> Vector:
+    """How the surface may lie at its ``points [n, dim]``, model units along the normal, ``[P, n]``.
+
+    Each row is one offset of the whole surface by a standard deviation, independent of the others; what the
+    atlas cannot express is not among them.
+    """
+    jacobian = _jacobian(posterior, points, covariates, latent)
+    return np.asarray(-(jacobian @ np.linalg.cholesky(posterior.along)).T)
+
+
 def surface_deviations(
     posterior: Posterior, points: NDArray[np.float32], covariates: Vector, latent: Vector
 ) -> Vector:
@@ -138,9 +150,8 @@ def surface_deviations(
 
     What the atlas cannot express is part of it.
     """
-    jacobian = _jacobian(posterior, points, covariates, latent)
-    explained = np.einsum("np,pq,nq->n", jacobian, posterior.along, jacobian)
-    return np.sqrt(explained + posterior.noise**2)
+    offsets = surface_offsets(posterior, points, covariates, latent)
+    return np.sqrt(np.sum(offsets**2, axis=0) + posterior.noise**2)
 
 
 def volume_deviation(

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     import trimesh
 
     from naisr_model.atlas import Atlas
+    from naisr_model.measures.curves import Gauge
+    from naisr_model.measures.norms import Norms
     from naisr_model.surface.tracking import Tracker
 
     Make = Callable[
@@ -56,6 +58,12 @@ class Source(Protocol):
 
     def atlas(self, path: Path) -> Atlas:
         """The networks of an open atlas."""
+
+    def gauge(self, path: Path) -> Gauge:
+        """What measures the shapes of an open atlas."""
+
+    def known_norms(self, path: Path) -> Norms | None:
+        """What is usual among the people of an open atlas, as far as it is known."""
 
     def who(self, path: Path, person: int) -> Who:
         """Whom a request is about."""

@@ -39,7 +39,7 @@ def _give(source: Source, request: SurfaceRequest, progress: Progress) -> Surfac
     first = later = source.previews.track_before(path, person, values, earlier)
     before_mm = first.points_mm
     if shape.origin is Origin.NETWORK:
-        later = source.previews.track(request, tracker)
+        later = tracker.track(dict(request.values))  # the same wherever the hand has been before
         moved_mm = first.points_mm - later.points_mm
         before_mm = shape.points_mm + at_nearest(later.points_mm, moved_mm, shape.points_mm)
     return replace(

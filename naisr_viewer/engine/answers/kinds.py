@@ -12,6 +12,7 @@ from naisr_viewer.engine.answers import (
     shape,
     template,
     uncertainty,
+    unusual,
 )
 from naisr_viewer.engine.answers.base import Answer
 
@@ -23,6 +24,7 @@ ANSWERS: dict[str, Answer] = {
     "scan": scan.ANSWER,
     "uncertainty": uncertainty.ANSWER,
     "deviation": deviation.ANSWER,
+    "unusual": unusual.ANSWER,
     "change": change.ANSWER,
     "scans": scans.ANSWER,
     "matrix": matrix.ANSWER,

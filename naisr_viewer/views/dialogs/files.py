@@ -54,6 +54,19 @@ def ask_session_place(parent: QWidget, state: ExplorerState) -> Path | None:
     return path.with_name(f"{path.name}{SESSION_ENDING}")
 
 
+def ask_curve_place(parent: QWidget, state: ExplorerState, ending: str) -> Path | None:
+    """Where a curve goes, or None; whether a file may be replaced is asked of the whole name."""
+    whom = f"-{Path(state.shown.name).stem}" if state.shown else ""
+    proposal = f"{state.atlas.name if state.atlas else 'atlas'}{whom}-{state.curve.measure}{ending}"
+    unasked = QFileDialog.Option.DontConfirmOverwrite
+    kind = f"{ending[1:].upper()} (*{ending})"
+    name, _ = QFileDialog.getSaveFileName(parent, "Save the curve", proposal, kind, "", unasked)
+    path = Path(name)
+    if not name or path.suffix.lower() == ending:
+        return path if name else None
+    return path.with_name(f"{path.name}{ending}")
+
+
 def ask_landmarks_path(parent: QWidget) -> Path | None:
     """The landmarks of a scan, a CSV name,x,y,z in its own coordinates, or None."""
     filters = "Landmarks: name,x,y,z (*.csv);;All files (*)"

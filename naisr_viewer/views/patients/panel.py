@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QScrollArea, QVBoxLay
 
 from naisr_model.covariates import Covariate
 from naisr_viewer.panels.kinds import layouts_of
+from naisr_viewer.state.curves import Standing
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Layout
 from naisr_viewer.state.patients import Named, OpenScan
@@ -17,7 +18,7 @@ from naisr_viewer.views.focus import in_order
 from naisr_viewer.views.patients.known import KnownPart, NumberField
 from naisr_viewer.views.patients.list import PatientList
 from naisr_viewer.views.patients.pieces import button, exchange, paragraph
-from naisr_viewer.views.patients.result import ComparePart, result_part
+from naisr_viewer.views.patients.result import ComparePart, result_part, standings_part
 from naisr_viewer.views.patients.scan import AlignmentPart, ScanPart
 
 PANEL_WIDTH = 300
@@ -54,7 +55,7 @@ class PatientPanel(QFrame):
         self.scan = ScanPart(self._inside)
         self.alignment = AlignmentPart(self._inside)
         self.known = KnownPart(self._inside)
-        self.result = QWidget()
+        self.result, self.standings = QWidget(), QWidget()
         self.compare = ComparePart(self._inside)
         self._compose()
         self._connect()
@@ -79,6 +80,15 @@ class PatientPanel(QFrame):
         self.scan.changed.setVisible(state.shown is not None and state.shown.is_changed)
         if state.shown is not None:
             self._show_patient(state.shown, old.shown)
+
+    def show_standings(self, standings: Sequence[Standing]) -> None:
+        """Say where the measures of the patient that is shown stand among people; none takes that away."""
+        self.standings = exchange(self.standings, standings_part(standings) if standings else QWidget())
+        self.standings.setVisible(bool(standings))
+
+    def reveal_standings(self) -> None:
+        """Scroll to where the measures stand."""
+        self._area.ensureWidgetVisible(self.standings, 0, 16)
 
     def sizeHint(self) -> QSize:
         """As wide as it may be; a narrow window gives it less."""
@@ -156,7 +166,15 @@ class PatientPanel(QFrame):
         column = QVBoxLayout(self._inside)
         column.setContentsMargins(MARGIN_PX, 2, MARGIN_PX, 12)
         column.setSpacing(20)
-        for part in (self.invitation, self.list, self.scan, self.alignment, self.known, self.result):
+        for part in (
+            self.invitation,
+            self.list,
+            self.scan,
+            self.alignment,
+            self.known,
+            self.result,
+            self.standings,
+        ):
             column.addWidget(part)
         column.addWidget(self.compare)
         column.addStretch(1)

@@ -16,7 +16,7 @@ TRUE_CM3 = 4 / 3 * np.pi * 22 * 20 * 32 / 1000
 
 @pytest.fixture(autouse=True)
 def coarse(monkeypatch):
-    monkeypatch.setattr("naisr_model.measures.norms.RESOLUTION", 32)
+    monkeypatch.setattr("naisr_model.measures.curves.COARSE", 32)
 
 
 @pytest.fixture

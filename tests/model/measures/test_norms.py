@@ -8,13 +8,16 @@ import numpy as np
 import pytest
 import trimesh
 from eggs import untrained
+from safetensors.numpy import load_file, save_file
 from scipy.stats import norm as normal
 
 from naisr_model.atlas import Atlas
 from naisr_model.errors import InputError
+from naisr_model.measures.curves import Gauge
+from naisr_model.measures.kept import load_norms, save_norms
 from naisr_model.measures.kinds import MEASURES, VOLUME, surface_of
-from naisr_model.measures.norms import WIDENING, People, dots, local_spread_of, people_of, spread_of
-from naisr_model.measures.report import measure_record, norms_of
+from naisr_model.measures.norms import WIDENING, People, local_spread_of, norms_of, people_of, spread_of
+from naisr_model.measures.report import measure_record
 
 SD = 0.05
 """Of the logarithm of a ball's radius among people of the same age."""
@@ -59,9 +62,10 @@ def test_percentiles_of_the_people_themselves_are_spread_evenly(balls):
     assert np.abs(normal.cdf(scores) - (np.arange(40) + 0.5) / 40).max() < 0.025
 
 
-def test_dots_are_as_fine_as_the_template(balls):
-    fine = surface_of(trimesh.creation.icosphere(subdivisions=4, radius=1.0))
-    radii = np.cbrt(dots(balls, VOLUME, fine) * 1000 * 3 / (4 * np.pi))
+def test_measures_of_a_coarse_surface_are_as_of_a_fine_one(balls):
+    gauge = Gauge(surface_of(trimesh.creation.icosphere(subdivisions=4, radius=1.0)), balls.template)
+    shapes = [balls.template.moved(points_mm) for points_mm in balls.own_mm]
+    radii = np.cbrt(gauge.curve(VOLUME, shapes) * 1000 * 3 / (4 * np.pi))
     truth = np.linalg.norm(balls.own_mm[:, 0], axis=1)
     assert radii == pytest.approx(truth, rel=2e-3)
 
@@ -86,24 +90,48 @@ def test_people_who_are_all_alike_have_no_spread(balls):
 
 def test_a_few_people_are_no_population():
     with pytest.raises(InputError, match="trained on 5 shapes; what is usual takes 10 or more"):
-        people_of(Atlas(untrained()))
+        people_of(Atlas(untrained()), surface_of(trimesh.creation.icosphere()))
 
 
 @pytest.fixture(scope="module")
 def norms(egg_atlas):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("naisr_model.measures.norms.RESOLUTION", 32)
+        patch.setattr("naisr_model.measures.curves.COARSE", 32)
         yield norms_of(Atlas.load(egg_atlas))
 
 
 def test_training_people_are_reconstructed(norms):
-    assert len(norms.people.covariates) == 19
-    ages = [values["age"] for values in norms.people.covariates]
-    sexes = [values["sex"] for values in norms.people.covariates]
+    ages, sexes = (norms.atlas.population.observed(name) for name in ("age", "sex"))
+    assert len(ages) == 19
     truth = [
         4 / 3 * np.pi * (20 + 2 * s) * 20 * (20 + 2 * a) / 1000 for a, s in zip(ages, sexes, strict=True)
     ]
-    assert dots(norms.people, VOLUME, norms.template) == pytest.approx(truth, rel=0.06)
+    assert norms.own["volume"] == pytest.approx(truth, rel=0.06)
+
+
+def test_norms_are_kept_without_shapes(norms, tmp_path):
+    file = tmp_path / "norms.safetensors"
+    save_norms(norms, file)
+    assert file.stat().st_size < 20_000
+    again, values = load_norms(file, norms.atlas), {"age": 6.0, "sex": 1.0}
+    assert measure_record(again, values) == measure_record(norms, values)
+    points = 1.05 * np.asarray(norms.gauge.coarse.points_mm)
+    kept, fresh = (each.local.scores(norms.atlas, points, values) for each in (again, norms))
+    assert np.array_equal(kept, fresh)
+
+
+@pytest.mark.parametrize("name", ["own.volume", "ratios.area", "local"])
+def test_damaged_norms_are_refused(norms, tmp_path, name):
+    file = tmp_path / "norms.safetensors"
+    save_norms(norms, file)
+    good = load_file(file)
+    for bad in ({name: good[name][1:]}, {name: np.full_like(good[name], np.nan)}):
+        save_file(good | bad, file)
+        with pytest.raises(InputError, match=f"'{name}' is not"):
+            load_norms(file, norms.atlas)
+    file.write_bytes(b"no tensors")
+    with pytest.raises(InputError, match="does not hold what is usual"):
+        load_norms(file, norms.atlas)
 
 
 def test_a_shape_is_told_among_its_people(norms):
@@ -116,7 +144,7 @@ def test_a_shape_is_told_among_its_people(norms):
 
 def test_places_of_the_surface_are_judged_by_their_own_spread(norms):
     atlas, values = norms.atlas, {"age": 6.0, "sex": 1.0}
-    (points,) = atlas.carried_mm(norms.template.points_mm, [values])
+    (points,) = atlas.carried_mm(norms.gauge.fine.points_mm, [values])
     sd = norms.local.sd_mm(atlas, points, values)
     assert sd.shape == (len(points),) and (sd > 0).all() and sd.max() < 1.5
     outward = points + sd[:, None] * points / np.linalg.norm(points, axis=1, keepdims=True)

@@ -6,6 +6,7 @@ import gc
 import json
 import os
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -309,7 +310,7 @@ def test_a_scan_astray_is_aligned_first_or_its_fit_is_told_not_valid(ready, qtbo
     undo(window, qtbot, controller)
     assert controller.state.shown.scan is lay and controller.state.fit is None
     undo(window, qtbot, controller)
-    assert controller.state == before
+    assert controller.state == replace(before, has_norms=True)  # what was learned is not forgotten
 
 
 def test_nobody_is_compared_with_whose_fit_missed(fitted, qtbot, tmp_path):
@@ -330,7 +331,8 @@ def test_nobody_is_compared_with_whose_fit_missed(fitted, qtbot, tmp_path):
     window.patients.patient_chosen.emit(good.patient)
     settle(qtbot, controller)
     box = window.patients.compare.box
-    assert [box.itemText(i) for i in range(box.count())] == ["this patient as fitted", "ball.stl"]
+    average = "average at the same covariates"
+    assert [box.itemText(i) for i in range(box.count())] == [average, "this patient as fitted", "ball.stl"]
     box.setFocus()
     QTest.keyClick(box, Qt.Key.Key_Down)
     assert box.currentData() is None and controller.state.compared is None
@@ -525,7 +527,9 @@ def test_all_views_on_screen_are_exported_with_their_numbers(fitted, qtbot, tmp_
     settle(qtbot, controller)
     files = {path.name: path for path in (tmp_path / "out").glob("*.vtp")}
     stems = {
-        Layout.FIT: ["full-shape_age8.5", "scan_age8.5", "uncertainty_age8.5", "deviation_age8.5"],
+        Layout.FIT: [
+            f"{view}_age8.5" for view in ("full-shape", "scan", "uncertainty", "deviation", "unusual-places")
+        ],
         Layout.CHANGE: ["before_age6", "full-shape_age8.5", "change_age8.5_sexM_since_age6"],
     }
     assert set(files) == {f"eggs-p01-{stem}_sexM.vtp" for stem in stems[layout]}

@@ -31,6 +31,12 @@ def test_a_name_tells_the_values_it_was_made_at(card):
     assert stem(FULL_SHAPE, ("sex", 0.5)) == "ellipsoid-full-shape_sex0.5"
 
 
+def test_a_change_names_the_average_that_it_is_counted_from(card):
+    request = SurfaceRequest(card.path, Panel("change"), VALUES, 64, 1, before=(0, VALUES))
+    values = "age150_weight34.5_sexM"
+    assert file_stem(card, request) == f"ellipsoid-change_{values}_since-average_{values}"
+
+
 def test_two_values_of_one_slider_make_two_files(state, tmp_path):
     choice = ExportChoice((FULL_SHAPE,), "stl", 64, tmp_path)
     first, second = (planned(with_value(state, "age", age), choice)[0].path for age in (50.0, 50.5))

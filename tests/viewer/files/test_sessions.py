@@ -11,6 +11,7 @@ import pytest
 from naisr_model.errors import InputError
 from naisr_viewer.files.sessions import read_session, write_session
 from naisr_viewer.state.camera import Camera
+from naisr_viewer.state.curves import CurveChoice
 from naisr_viewer.state.drawer import Tab
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Layout
@@ -20,7 +21,7 @@ from naisr_viewer.state.pins import Pin
 from naisr_viewer.state.session import SavedAtlas, SavedFit, SavedPatient, Session
 from naisr_viewer.state.support import Support
 
-BESIDE = {"atlas", "patients", "is_atlas_changed"}
+BESIDE = {"atlas", "patients", "has_norms", "is_atlas_changed"}
 """Fields of a state that a session has elsewhere, or not."""
 
 
@@ -41,6 +42,7 @@ def everything(folder: Path) -> Session:
             muted=("sex",),
             touched="age",
             support=Support("sex", "age", True),
+            curve=CurveChoice("length", "sex"),
         ),
         (
             SavedPatient(1, "a", Reading(folder / "a.stl", 3)),

@@ -12,7 +12,7 @@ from naisr_model.evaluation.study import run
 
 
 def test_people_larger_than_all_of_the_population_stand_above_them(egg_people, monkeypatch):
-    monkeypatch.setattr("naisr_model.measures.norms.RESOLUTION", 32)
+    monkeypatch.setattr("naisr_model.measures.curves.COARSE", 32)
     report = run(NormsStudy(egg_people.atlas, patients=2))
     assert report["n"] == 2 and report["rows"].keys() == {"volume", "area", SCAN}
     # 1.02 ** 3 of the volume, where eggs of one age and sex are all alike.

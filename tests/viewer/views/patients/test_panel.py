@@ -12,7 +12,14 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QScrollArea, QToolButton, QWidget
 from pytestqt.qtbot import QtBot
 
-from naisr_viewer.state.explorer import ExplorerState, opened, showing, with_patient, without_patient
+from naisr_viewer.state.explorer import (
+    AVERAGE_KEY,
+    ExplorerState,
+    opened,
+    showing,
+    with_patient,
+    without_patient,
+)
 from naisr_viewer.state.patients import Fitted, OpenScan, Reading, Scan
 from naisr_viewer.views.patients import panel as pp
 from naisr_viewer.views.patients.known import NumberField
@@ -500,7 +507,7 @@ def test_one_whose_fit_missed_cannot_be_compared_with(panel, start, heard):
     state = replace(with_patient(others, replace(ONE, fit=FIT)), compared=2)
     panel.show_state(state)
     box = panel.compare.box
-    assert box.currentData() is None and state.reference == FIT
+    assert box.currentData() is None and state.reference == (FIT.person, FIT.values)
     hint = box.itemData(box.findText("p02.ply"), Qt.ItemDataRole.ToolTipRole)
     assert "cannot be compared with" in hint and "not valid" in hint
     box.setFocus()
@@ -527,12 +534,14 @@ def test_other_fitted_patients_can_be_compared_with(panel, start, heard):
     state = with_patient(with_patient(start, replace(TWO, fit=FIT)), replace(ONE, key=3, name="p03.stl"))
     panel.show_state(with_patient(state, replace(ONE, fit=FIT)))
     texts = [panel.compare.box.itemText(i) for i in range(panel.compare.box.count())]
-    assert texts == ["this patient as fitted", "p02.ply"]
+    assert texts == ["average at the same covariates", "this patient as fitted", "p02.ply"]
+    assert panel.compare.box.currentText() == "this patient as fitted"
     choose(panel.compare.box, "p02.ply")
     panel.show_state(replace(with_patient(state, replace(ONE, fit=FIT)), compared=2))
     assert panel.compare.box.currentData() == 2
     choose(panel.compare.box, "this patient as fitted")
-    assert heard == [("compared_chosen", 2), ("compared_chosen", None)]
+    choose(panel.compare.box, "average at the same covariates")
+    assert heard == [("compared_chosen", 2), ("compared_chosen", None), ("compared_chosen", AVERAGE_KEY)]
     assert state.patient == 3
     panel.show_state(state)
     assert not panel.compare.isVisible()
