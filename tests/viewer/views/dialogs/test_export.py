@@ -24,13 +24,14 @@ def state(card) -> ExplorerState:
 
 @pytest.mark.parametrize("layout", set(Layout) - {Layout.MATRIX})
 def test_all_views_are_proposed_as_they_are_on_screen(qtbot, card, state, layout):
-    dialog = ExportDialog(replace(state, layout=layout))
+    state = replace(state, layout=layout)
+    dialog = ExportDialog(state)
     qtbot.addWidget(dialog)
     choice = dialog.choice()
-    assert choice.panels == panels_in(layout, card)
+    assert choice.panels == visible_panels(state)
     each = [dialog.what.itemData(index) for index in range(1, dialog.what.count())]
     assert sorted(each, key=str) == sorted(
-        {(panel,) for panel in (*panels_in(layout, card), *panels_in(Layout.SIDE_BY_SIDE, card))}, key=str
+        {(panel,) for panel in (*visible_panels(state), *panels_in(Layout.SIDE_BY_SIDE, card))}, key=str
     )
     assert choice.resolution == EXACT_RESOLUTION
     assert choice.folder == Path.home()
