@@ -170,12 +170,13 @@ class ShapeView(QWidget):
 
     def show_scales(self, scales: Mapping[Panel, PanelScale | None]) -> None:
         """Say what the colours of surfaces stand for; those left out have none."""
+        changed = [panel for panel, cell in self._grid.cells.items() if cell.scale != scales.get(panel)]
+        if not changed:  # as long as a slider moves
+            return
         had = self._strips
-        for panel, cell in self._grid.cells.items():
-            before = cell.scale
-            cell.show_scale(scales.get(panel))
-            if cell.scale != before and self._canvas is not None:
-                self._paint(panel)
+        for panel in changed:
+            self._grid.cells[panel].show_scale(scales.get(panel))
+            self._paint(panel)
         if self._strips != had:
             self._arrange()
         else:
