@@ -275,8 +275,8 @@ def open_window(
         controller = Controller(window, engine, Worker(), Worker(), Preferences(settings))
         made.append((window, controller))
         window.resize(*size)
-        window.show()
-        qtbot.waitExposed(window)
+        with qtbot.waitExposed(window):
+            window.show()
         return window, controller
 
     yield make

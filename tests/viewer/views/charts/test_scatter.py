@@ -31,8 +31,8 @@ def scatter(qtbot, card) -> Scatter:
     scatter.show_visits(axes_of(AGE_WEIGHT, card), visits_of(AGE_WEIGHT, card))
     scatter.show_edge(remoteness(AGE_WEIGHT, card, HERE))
     scatter.show_place(100.0, 35.0)
-    around.show()
-    qtbot.waitExposed(around)
+    with qtbot.waitExposed(around):
+        around.show()
     scatter.around = around
     return scatter
 

@@ -12,6 +12,7 @@ from PySide6.QtGui import QColor
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
+from naisr_viewer.program.headless import pause
 from naisr_viewer.state.explorer import ExplorerState, opened, with_patient, with_values
 from naisr_viewer.state.patients import OpenScan, Reading, Scan
 from naisr_viewer.state.support import Support
@@ -30,8 +31,8 @@ def panel(qtbot: QtBot, card) -> CovariatePanel:
     panel.show_atlas(card, LIGHT)
     panel.show_values(opened(ExplorerState(), card))
     panel.resize(PANEL_WIDTH, HIGH_PX)
-    panel.show()
-    qtbot.waitExposed(panel)
+    with qtbot.waitExposed(panel):
+        panel.show()
     panel.support.prepare()
     return panel
 
