@@ -216,16 +216,23 @@ def no_traces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture(autouse=True)
-def nothing_outlives_a_test() -> Iterator[None]:
-    """No window, timer's owner or thread of ours is left when a test ends."""
+def nothing_outlives_a_test(request: pytest.FixtureRequest) -> Iterator[None]:
+    """No window, timer's owner or thread of ours is left when a test ends.
+
+    Garbage is collected then, by the window's thread. A worker's thread could come to it in the middle of a
+    test and delete what belongs to a closed window, whereupon Qt aborts the process.
+    """
     before = set(threading.enumerate())
+    gc.disable()
     yield
+    request.node.funcargs.clear()  # else what the test was given lives on until the next one
     app = QApplication.instance()
     if isinstance(app, QApplication):
         gc.collect()
         app.sendPostedEvents(None, QEvent.Type.DeferredDelete.value)
         left = [widget for widget in app.topLevelWidgets() if widget.parent() is None]
         assert left == []
+    gc.enable()
     threads = [thread.name for thread in set(threading.enumerate()) - before]
     assert [name for name in threads if name.startswith("naisr")] == []
 
