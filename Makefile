@@ -4,6 +4,7 @@
 #   TORCH_INDEX  where torch comes from; by default PyTorch's index of CPU builds on a Linux machine
 #             without an NVIDIA driver (the usual build brings several GB of CUDA), else pip's own index
 #   PIP_ARGS  more arguments for every `pip install`
+#   WORKERS   processes that run the tests, about 2 GB each
 
 SHELL := /bin/bash
 PYTHON ?= python3
@@ -14,6 +15,7 @@ STAMP := $(VENV)/.installed
 # Progress bars are for people; a log gets errors only.
 PIP := $(BIN)/python -m pip install --disable-pip-version-check $(if $(MAKE_TERMOUT),,--quiet)
 PYTEST_ARGS ?=
+WORKERS ?= 2
 
 ifeq ($(shell uname),Linux)
 ifeq ($(shell command -v nvidia-smi),)
@@ -91,7 +93,7 @@ run: env ## open the viewer; without a display, write pictures and meshes into o
 	  echo "Screenshots and exported meshes are in $(CURDIR)/out"
 
 test: lint ## check format, style and types, then run the tests
-	@$(BIN)/pytest $(PYTEST_ARGS)
+	@$(BIN)/pytest --numprocesses $(WORKERS) --dist worksteal $(PYTEST_ARGS)
 
 fuzz: env ## try broken inputs of every kind, some minutes, and count in the results how they end
 	@$(BIN)/pytest -m fuzz tests/corpus --counts resources/docs/results.md $(PYTEST_ARGS)

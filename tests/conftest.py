@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 import torch
 import trimesh
 from eggs import egg, egg_deepsdf_preset, egg_preset
+from filelock import FileLock
 
 from naisr_model.data.prepare import PrepareOptions, prepare
 from naisr_model.data.store import SampleStore
@@ -21,43 +24,62 @@ def one_thread() -> None:
 
 
 @pytest.fixture(scope="session")
+def made_once(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, Callable[[Path], object]], Path]:
+    """Makes a folder by its name; where tests run in several processes, one of them does it for all."""
+    base = tmp_path_factory.getbasetemp()
+    common = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+
+    def folder(name: str, make: Callable[[Path], object]) -> Path:
+        place, done = common / name, common / f"{name}.done"
+        with FileLock(common / f"{name}.lock"):
+            if not done.exists():
+                place.mkdir(exist_ok=True)
+                make(place)
+                done.touch()
+        return place
+
+    return folder
+
+
+@pytest.fixture(scope="session")
 def ball() -> trimesh.Trimesh:
     """A sphere about the origin, radius 10 mm; its volume is within 0.2 % of the true sphere's."""
     return trimesh.creation.icosphere(subdivisions=4, radius=10.0)
 
 
 @pytest.fixture(scope="session")
-def egg_table(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def egg_table(made_once) -> Path:
     """Twenty-four eggs as a user would bring them: STL files and a CSV."""
-    folder = tmp_path_factory.mktemp("eggs")
-    lines = ["mesh,subject,visit,age [years],sex"]
-    for number in range(24):
-        age, sex = 1 + 8 * number / 23, (-1, 1)[number % 2]
-        egg(age, sex).export(folder / f"egg{number}.stl")
-        lines.append(f"egg{number}.stl,S{number},1,{age:.3f},{'FM'[number % 2]}")
-    (folder / "eggs.csv").write_text("\n".join(lines) + "\n")
-    return folder / "eggs.csv"
+
+    def make(folder: Path) -> None:
+        lines = ["mesh,subject,visit,age [years],sex"]
+        for number in range(24):
+            age, sex = 1 + 8 * number / 23, (-1, 1)[number % 2]
+            egg(age, sex).export(folder / f"egg{number}.stl")
+            lines.append(f"egg{number}.stl,S{number},1,{age:.3f},{'FM'[number % 2]}")
+        (folder / "eggs.csv").write_text("\n".join(lines) + "\n")
+
+    return Path(made_once("eggs", make) / "eggs.csv")
 
 
 @pytest.fixture(scope="session")
-def egg_store(egg_table: Path, tmp_path_factory: pytest.TempPathFactory) -> SampleStore:
+def egg_store(egg_table: Path, made_once) -> SampleStore:
     """The eggs prepared for training."""
-    out = tmp_path_factory.mktemp("store")
-    prepare(egg_table, out, options=PrepareOptions(2000, 2000, 2000, workers=1))
-    return SampleStore.open(out)
+    options = PrepareOptions(2000, 2000, 2000, workers=1)
+    return SampleStore.open(made_once("egg-store", lambda out: prepare(egg_table, out, options=options)))
 
 
 @pytest.fixture(scope="session")
-def egg_atlas(egg_store: SampleStore, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def egg_atlas(egg_store: SampleStore, made_once) -> Path:
     """An atlas of the eggs, trained for some seconds."""
-    out = tmp_path_factory.mktemp("atlas") / "eggs.safetensors"
-    train(egg_store, egg_preset(epochs=300), out)
-    return out
+    file = "eggs.safetensors"
+    preset = egg_preset(epochs=300)
+    return Path(made_once("egg-atlas", lambda out: train(egg_store, preset, out / file)) / file)
 
 
 @pytest.fixture(scope="session")
-def egg_deepsdf(egg_store: SampleStore, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def egg_deepsdf(egg_store: SampleStore, made_once) -> Path:
     """The same of a model that depends on no covariates."""
-    out = tmp_path_factory.mktemp("deepsdf") / "eggs.safetensors"
-    train(egg_store, egg_deepsdf_preset(epochs=60), out)
-    return out
+    file = "eggs.safetensors"
+    preset = egg_deepsdf_preset(epochs=60)
+    return Path(made_once("egg-deepsdf", lambda out: train(egg_store, preset, out / file)) / file)

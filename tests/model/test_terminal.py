@@ -27,7 +27,7 @@ def program(code: str, **options) -> subprocess.CompletedProcess[str]:
     environment = {**os.environ, "PYTHONPATH": str(ROOT), **options.pop("env", {})}
     channels = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | options
     return subprocess.run(
-        [sys.executable, "-c", text], text=True, timeout=60, env=environment, check=False, **channels
+        [sys.executable, "-c", text], text=True, timeout=300, env=environment, check=False, **channels
     )
 
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import gc
 import threading
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import trimesh
 from PySide6.QtCore import QEvent, QSettings
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
 
 from naisr_model.capabilities import Capabilities
@@ -34,6 +34,9 @@ WEIGHT = Covariate("weight", "kg", "continuous", 35.0, 20.0, (4.0, 95.0))
 SEX = Covariate("sex", "", "binary", 0.0, 1.0, (-1.0, 1.0), ("F", "M"))
 COVARIATES = (AGE, WEIGHT, SEX)
 
+PATIENCE_MS = 60_000
+"""Nothing that a test waits for takes so long, even on a slow machine that has other things to do."""
+
 
 def people(count: int = 200) -> Population:
     """Children whose weight grows with their age."""
@@ -51,13 +54,19 @@ def people(count: int = 200) -> Population:
 
 
 class EllipsoidTracker:
-    """Scales the template's vertices; what is older than 200 months counts as folded."""
+    """Scales the template's vertices; what is older than 200 months counts as folded.
 
-    def __init__(self, template: trimesh.Trimesh) -> None:
-        self.template = template
+    ``began`` counts the previews, none of which is finished while ``gate`` is shut.
+    """
+
+    def __init__(self, template: trimesh.Trimesh, gate: threading.Event) -> None:
+        self.template, self.gate = template, gate
+        self.began = 0
         self.faces = np.asarray(template.faces, np.int64)
 
     def track(self, values, start=None):
+        self.began += 1
+        assert self.gate.wait(PATIENCE_MS / 1000)
         ratio = np.divide(EllipsoidAtlas.half_axes_mm(**values), EllipsoidAtlas.half_axes_mm())
         normals = self.template.vertex_normals / ratio
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
@@ -68,10 +77,11 @@ class EllipsoidTracker:
 class EllipsoidAtlas:
     """Ellipsoids: age makes them longer, weight wider, sex deeper.
 
-    Half-axes in mm are (20 + 0.1 (weight - 35), 20 + 3 sex, 45 + 0.15 (age - 100)).
+    Half-axes in mm are (20 + 0.1 (weight - 35), 20 + 3 sex, 45 + 0.15 (age - 100)). No surface is finished
+    while ``gate`` is shut, however long that is: it can only be given up.
     """
 
-    def __init__(self, name: str = "ellipsoid", step_s: float = 0.0, steps: int = 1) -> None:
+    def __init__(self, name: str = "ellipsoid") -> None:
         self.name = name
         self.population = people()
         self.covariates = COVARIATES
@@ -84,7 +94,10 @@ class EllipsoidAtlas:
             vanishes_at_centre=True,
         )
         self.frame = Frame((0.0, 0.0, 0.0), 100.0)
-        self.step_s, self.steps = step_s, steps
+        self.gate, self.preview_gate = threading.Event(), threading.Event()
+        self.gate.set()
+        self.preview_gate.set()
+        self.trackers: list[EllipsoidTracker] = []
         self.calls: list[tuple[str, dict[str, float], int]] = []
         self.running = 0
         self.cancelled = 0
@@ -156,14 +169,17 @@ class EllipsoidAtlas:
         return DisplacementTables(np.zeros((2, 3)), ())
 
     def tracker(self, template, tables):
-        return EllipsoidTracker(template)
+        self.trackers.append(EllipsoidTracker(template, self.preview_gate))
+        return self.trackers[-1]
 
     def _surface(self, what, values, resolution, progress):
         self.calls.append((what, values, resolution))
         self.running += 1
         try:
-            for _ in progress.over(range(self.steps)):
-                time.sleep(self.step_s)
+            progress.check()
+            while not self.gate.wait(0.002):
+                progress.check()
+            progress.tell(1.0)
         except Cancelled:
             self.cancelled += 1
             raise
@@ -174,6 +190,24 @@ class EllipsoidAtlas:
         return mesh
 
 
+class PatientBot(QtBot):
+    """One whose waits end when something is wrong, not when a machine is slow."""
+
+    def waitUntil(self, callback: Callable[[], bool | None], *, timeout: int = PATIENCE_MS) -> None:
+        super().waitUntil(callback, timeout=timeout)
+
+    def waitSignal(self, signal: Any, *, timeout: int = PATIENCE_MS, **options: Any) -> Any:
+        return super().waitSignal(signal, timeout=timeout, **options)
+
+    def waitExposed(self, widget: QWidget, *, timeout: int = PATIENCE_MS) -> Any:
+        return super().waitExposed(widget, timeout=timeout)
+
+
+@pytest.fixture
+def qtbot(qapp: QApplication, request: pytest.FixtureRequest) -> QtBot:
+    return PatientBot(request)
+
+
 @pytest.fixture(autouse=True)
 def no_traces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Keep tabulated displacements and sessions out of the folders of whoever runs the tests."""
@@ -182,16 +216,23 @@ def no_traces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture(autouse=True)
-def nothing_outlives_a_test() -> Iterator[None]:
-    """No window, timer's owner or thread of ours is left when a test ends."""
+def nothing_outlives_a_test(request: pytest.FixtureRequest) -> Iterator[None]:
+    """No window, timer's owner or thread of ours is left when a test ends.
+
+    Garbage is collected then, by the window's thread. A worker's thread could come to it in the middle of a
+    test and delete what belongs to a closed window, whereupon Qt aborts the process.
+    """
     before = set(threading.enumerate())
+    gc.disable()
     yield
+    request.node.funcargs.clear()  # else what the test was given lives on until the next one
     app = QApplication.instance()
     if isinstance(app, QApplication):
         gc.collect()
         app.sendPostedEvents(None, QEvent.Type.DeferredDelete.value)
         left = [widget for widget in app.topLevelWidgets() if widget.parent() is None]
         assert left == []
+    gc.enable()
     threads = [thread.name for thread in set(threading.enumerate()) - before]
     assert [name for name in threads if name.startswith("naisr")] == []
 
@@ -241,8 +282,8 @@ def open_window(
         controller = Controller(window, engine, Worker(), Worker(), Preferences(settings))
         made.append((window, controller))
         window.resize(*size)
-        window.show()
-        qtbot.waitExposed(window)
+        with qtbot.waitExposed(window):
+            window.show()
         return window, controller
 
     yield make

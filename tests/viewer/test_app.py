@@ -34,7 +34,7 @@ def run(code: str, *hidden: str) -> subprocess.CompletedProcess[str]:
         env={name: value for name, value in os.environ.items() if name not in hidden},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=600,
         check=False,
     )
 

@@ -31,7 +31,7 @@ class Person:
 
 def bent_pear(size: float) -> trimesh.Trimesh:
     """A body that no half turn and no mirror lays on itself."""
-    mesh = trimesh.creation.icosphere(3)
+    mesh = trimesh.creation.icosphere(2)
     x, y, z = mesh.vertices.T
     x = x * (1 + 0.4 * z) + 0.3 * np.cos(2.5 * z)
     mesh.vertices = np.stack([20 * x, 14 * y * (1 + 0.3 * x), 30 * z + 4 * y], axis=1) * size

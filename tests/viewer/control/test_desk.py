@@ -39,8 +39,8 @@ CUBIC_CM = egg(6.0, 1.0).volume / 1000
 
 
 @pytest.fixture(scope="module")
-def engine(egg_atlas, tmp_path_factory) -> Engine:
-    return Engine(folder=tmp_path_factory.mktemp("kept"))
+def engine(egg_cache) -> Engine:
+    return Engine(folder=egg_cache)
 
 
 @pytest.fixture
@@ -48,8 +48,8 @@ def ready(qtbot, engine, egg_atlas, tmp_path):
     """A window on the atlas of the eggs."""
     window, controller = make_window(engine, tmp_path / "settings.ini")
     window.resize(1280, 800)
-    window.show()
-    qtbot.waitExposed(window)
+    with qtbot.waitExposed(window):
+        window.show()
     controller.open(egg_atlas)
     settle(qtbot, controller)
     yield window, controller

@@ -15,7 +15,7 @@ from naisr_viewer.control import jobs
 from naisr_viewer.files.sessions import read_session
 from naisr_viewer.panels.kinds import missing, visible_panels
 from naisr_viewer.panels.matrix import here
-from naisr_viewer.program.headless import finish
+from naisr_viewer.program.headless import finish, pause
 from naisr_viewer.state.explorer import ExplorerState, opened
 from naisr_viewer.state.layouts import Layout
 from naisr_viewer.views.dialogs.export import ExportDialog
@@ -122,7 +122,7 @@ def test_cells_outside_the_data_are_pale_and_the_present_one_is_outlined(ready, 
     canvas = window.findChild(Canvas)
     QTest.mouseClick(canvas, LEFT, pos=middle(canvas, 4, 3))
     finish(window, controller)
-    QTest.qWait(50)
+    pause(0.05)
     image = window.shapes.grab().toImage()
 
     def strength(column: int, row: int) -> int:

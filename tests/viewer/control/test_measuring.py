@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,20 +26,9 @@ CTRL_SHIFT = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModi
 LEFT = Qt.MouseButton.LeftButton
 
 
-@pytest.fixture(autouse=True)
-def coarse(monkeypatch):
-    monkeypatch.setattr("naisr_model.measures.curves.COARSE", 24)
-
-
-@pytest.fixture(scope="module")
-def cache(tmp_path_factory) -> Path:
-    """What is usual is worked out by the first window."""
-    return tmp_path_factory.mktemp("cache")
-
-
 @pytest.fixture
-def ready(whole_window, egg_atlas, cache):
-    window, controller = whole_window(Engine(folder=cache))
+def ready(whole_window, egg_atlas, egg_cache):
+    window, controller = whole_window(Engine(folder=egg_cache))
     controller.open(egg_atlas)
     finish(window, controller)
     return window, controller

@@ -21,8 +21,8 @@ PATIENCE_MS = 20_000
 
 
 @pytest.fixture
-def ready(whole_window, egg_atlas, tmp_path):
-    window, controller = whole_window(Engine(folder=tmp_path / "cache"))
+def ready(whole_window, egg_atlas, egg_cache):
+    window, controller = whole_window(Engine(folder=egg_cache))
     controller.open(egg_atlas)
     finish(window, controller)
     return window, controller

@@ -23,9 +23,9 @@ from naisr_viewer.views.shapes.canvas import Canvas
 
 
 @pytest.fixture
-def fitted(whole_window, egg_atlas, tmp_path):
+def fitted(whole_window, egg_atlas, egg_cache, tmp_path):
     """A patient fitted and moved, a place pinned, the shapes turned and seen from nearer."""
-    window, controller = whole_window(Engine(folder=tmp_path / "cache"))
+    window, controller = whole_window(Engine(folder=egg_cache))
     controller.open(egg_atlas)
     finish(window, controller)
     egg(6.0, 1.0).export(tmp_path / "p01.stl")
@@ -54,7 +54,7 @@ def pixels(window) -> NDArray[np.uint8]:
     return rows[:, : 3 * image.width()].copy()
 
 
-def test_a_session_is_seen_again_pixel_by_pixel(fitted, whole_window, monkeypatch, tmp_path):
+def test_a_session_is_seen_again_pixel_by_pixel(fitted, whole_window, egg_cache, monkeypatch, tmp_path):
     window, controller = fitted
     assert len(controller.state.pins) == 1
     monkeypatch.setattr(files.QFileDialog, "getSaveFileName", lambda *_: (str(tmp_path / "mine"), ""))
@@ -62,7 +62,7 @@ def test_a_session_is_seen_again_pixel_by_pixel(fitted, whole_window, monkeypatc
     finish(window, controller)
     assert "Saved" in window.status.text() and (tmp_path / "mine.json").is_file()
     before = pixels(window)
-    other, other_controller = whole_window(Engine(folder=tmp_path / "cache"))
+    other, other_controller = whole_window(Engine(folder=egg_cache))
     monkeypatch.setattr(files.QFileDialog, "getOpenFileName", lambda *_: (str(tmp_path / "mine.json"), ""))
     action(other, "Open session…").trigger()
     finish(other, other_controller)
@@ -76,13 +76,13 @@ def action(window, text: str) -> QAction:
     return next(each for each in window.findChildren(QAction) if each.text() == text)
 
 
-def test_what_is_on_screen_is_kept_for_the_next_run(qtbot, egg_atlas, tmp_path):
+def test_what_is_on_screen_is_kept_for_the_next_run(qtbot, egg_atlas, egg_cache, tmp_path):
     kept, settings = tmp_path / "state" / "session.json", tmp_path / "settings.ini"
 
     def run(act) -> None:
-        window, controller = make_window(Engine(folder=tmp_path / "cache"), settings, True, kept)
-        window.show()
-        qtbot.waitExposed(window)
+        window, controller = make_window(Engine(folder=egg_cache), settings, True, kept)
+        with qtbot.waitExposed(window):
+            window.show()
         try:
             act(window, controller)
         finally:

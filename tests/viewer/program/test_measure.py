@@ -74,7 +74,7 @@ def test_the_whole_program_is_timed_without_any_display(egg_atlas, tmp_path):
         env={**environment, "XDG_CACHE_HOME": str(tmp_path)},
         capture_output=True,
         text=True,
-        timeout=300,
+        timeout=600,
         check=False,
     )
     assert done.returncode == 0, done.stderr

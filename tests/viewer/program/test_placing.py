@@ -13,8 +13,8 @@ from naisr_viewer.views.main_window import MainWindow
 def shown(qtbot, settings, pixels: tuple[int, int] | None) -> MainWindow:
     window = MainWindow()
     place(window, pixels, Preferences(settings))
-    window.show()
-    qtbot.waitExposed(window)
+    with qtbot.waitExposed(window):
+        window.show()
     return window
 
 

@@ -81,8 +81,8 @@ def state(request, card) -> ExplorerState:
 def window(qtbot):
     window = MainWindow()
     window.resize(1280, 770)
-    window.show()
-    qtbot.waitExposed(window)
+    with qtbot.waitExposed(window):
+        window.show()
     window.activateWindow()
     qtbot.waitUntil(window.isActiveWindow)
     yield window

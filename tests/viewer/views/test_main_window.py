@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import itertools
 import threading
 from pathlib import Path
 
@@ -60,18 +61,25 @@ def test_a_drag_with_the_mouse_ends_exact_and_leaves_no_queue(ready, qtbot, atla
     window, controller = ready
     QTest.mouseClick(window.covariates.rows["sex"].buttons[1], Qt.MouseButton.LeftButton)
     wait_idle(qtbot, controller)
+    (tracker,) = atlas.trackers
+    before = tracker.began
     atlas.calls.clear()
-    atlas.steps, atlas.step_s = 5, 0.01  # 50 ms a surface, far slower than the mouse
+    atlas.preview_gate.clear()  # no preview is finished before the mouse is let go
     slider = window.covariates.rows["age"].slider
     QTest.mousePress(slider, Qt.MouseButton.LeftButton, pos=at(slider, 0.45))
     for step in range(80):
         QTest.mouseMove(slider, at(slider, 0.45 + 0.5 * step / 80))
         QApplication.processEvents()
-    while_moving = len(atlas.calls)
-    assert {size for _, _, size in atlas.calls} <= {PREVIEW_RESOLUTION}
+    qtbot.waitUntil(lambda: tracker.began > before)
     QTest.mouseRelease(slider, Qt.MouseButton.LeftButton, pos=at(slider, 0.95))
+    atlas.preview_gate.set()
     wait_idle(qtbot, controller)
-    assert len(atlas.calls) - while_moving <= 8  # what ran, what waited, and the exact ones
+    assert tracker.began - before <= 6  # what ran, what waited, and where the mouse was let go
+    assert {(what, size) for what, _, size in atlas.calls} == {
+        ("age", EXACT_RESOLUTION),
+        ("shape", EXACT_RESOLUTION),
+    }
+    assert len(atlas.calls) == 2
     assert atlas.running == 0
     age = dict(controller.state.named)["age"]
     last = 0.45 + 0.5 * 79 / 80
@@ -83,23 +91,22 @@ def test_a_drag_with_the_mouse_ends_exact_and_leaves_no_queue(ready, qtbot, atla
         atlas.volume_cm3(age=age, sex=1.0), rel=0.01
     )
     assert f"{controller.shown[FULL_SHAPE].volume_cm3:.1f} cm³" in window.shapes.caption(FULL_SHAPE)
-    assert {what for what, _, _ in atlas.calls} == {"age", "shape"}
 
 
 def test_the_ring_among_the_data_is_dragged_like_both_sliders(ready, qtbot, atlas):
     window, controller = ready
     window.resize(960, 900)
-    qtbot.waitUntil(lambda: window.covariates.support.chart is not None, timeout=5000)
+    qtbot.waitUntil(lambda: window.covariates.support.chart is not None)
     chart = window.covariates.support.chart
-    qtbot.waitUntil(chart.isVisible, timeout=5000)
+    qtbot.waitUntil(chart.isVisible)
     wait_idle(qtbot, controller)
-    QTest.qWait(50)  # the axes take their room
+    pause(0.05)  # the axes take their room
     start, goal = chart.place_of(100, 35).toPoint(), chart.place_of(180, 62).toPoint()
     QTest.mousePress(chart.viewport(), Qt.MouseButton.LeftButton, pos=start)
     for step in range(1, 11):
         QTest.mouseMove(chart.viewport(), start + (goal - start) * step / 10)
-        QTest.qWait(5)
-    qtbot.waitUntil(lambda: "Preview" in window.status.text(), timeout=5000)
+        pause(0.005)
+    qtbot.waitUntil(lambda: "Preview" in window.status.text())
     assert controller.is_moving
     QTest.mouseRelease(chart.viewport(), Qt.MouseButton.LeftButton, pos=goal)
     wait_idle(qtbot, controller)
@@ -118,18 +125,20 @@ def test_the_ring_among_the_data_is_dragged_like_both_sliders(ready, qtbot, atla
     wait_idle(qtbot, controller)
 
 
-def test_previews_are_seen_while_the_mouse_moves(ready, qtbot, atlas):
+def test_previews_are_seen_while_the_mouse_moves(ready, qtbot):
     window, controller = ready
-    atlas.steps, atlas.step_s = 3, 0.01
     slider = window.covariates.rows["age"].slider
     seen: set[float] = set()
+    steps = itertools.count()
+
+    def moved() -> bool:
+        QTest.mouseMove(slider, at(slider, 0.1 + 0.8 * (next(steps) % 60) / 60))
+        seen.update(value for _, value in controller.shown[AGE_ONLY].request.values)
+        return len(seen) >= 4
+
     QTest.mousePress(slider, Qt.MouseButton.LeftButton, pos=at(slider, 0.1))
-    for step in range(60):
-        QTest.mouseMove(slider, at(slider, 0.1 + 0.8 * step / 60))
-        pause(0.01)
-        seen |= {value for _, value in controller.shown[AGE_ONLY].request.values}
+    qtbot.waitUntil(moved)
     QTest.mouseRelease(slider, Qt.MouseButton.LeftButton, pos=at(slider, 0.9))
-    assert len(seen) >= 4
     assert "Preview" in window.status.text()
     wait_idle(qtbot, controller)
     assert "Exact" in window.status.text()
@@ -137,16 +146,16 @@ def test_previews_are_seen_while_the_mouse_moves(ready, qtbot, atlas):
 
 def test_the_window_answers_while_a_surface_is_computed(ready, qtbot, atlas):
     window, controller = ready
-    atlas.steps, atlas.step_s = 100_000, 0.01  # longer than anybody waits
+    atlas.gate.clear()
     answered_during_work: list[bool] = []
     timer = QTimer(window, interval=10)
     timer.timeout.connect(lambda: answered_during_work.append(atlas.running > 0))
     timer.start()
     window.covariates.value_settled.emit("weight", 60.0)
-    qtbot.waitUntil(lambda: sum(answered_during_work) >= 20, timeout=30_000)
+    qtbot.waitUntil(lambda: sum(answered_during_work) >= 20)
     timer.stop()
     assert controller.is_busy
-    qtbot.waitUntil(window.cancel.isVisible, timeout=30_000)
+    qtbot.waitUntil(window.cancel.isVisible)
     QTest.mouseClick(window.cancel, Qt.MouseButton.LeftButton)
     wait_idle(qtbot, controller)
     assert "Stopped" in window.status.text()

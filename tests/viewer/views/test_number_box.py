@@ -35,8 +35,8 @@ class Stage(QWidget):
 def stage(qtbot):
     stage = Stage()
     qtbot.addWidget(stage)
-    stage.show()
-    qtbot.waitExposed(stage)
+    with qtbot.waitExposed(stage):
+        stage.show()
     stage.activateWindow()
     qtbot.waitUntil(stage.isActiveWindow)  # only then it hears keys
     return stage

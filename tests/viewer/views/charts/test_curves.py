@@ -45,8 +45,8 @@ def chart(qtbot, atlas) -> CurveChart:
     chart.set_theme(LIGHT)
     chart.show_curve(atlas.covariates[0], CURVES, VOLUME, COLOURS)
     chart.show_place(100.0)
-    around.show()
-    qtbot.waitExposed(around)
+    with qtbot.waitExposed(around):
+        around.show()
     chart.around = around
     return chart
 

@@ -12,7 +12,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QWidget
 
 from naisr_viewer.state.support import Support, axes_of, remoteness, visits_of
-from naisr_viewer.views.charts.scatter import SETTLE_MS, Scatter, edges, strewn
+from naisr_viewer.views.charts.scatter import Scatter, edges, strewn
 from naisr_viewer.views.theme import LIGHT
 
 AGE_WEIGHT, AGE_SEX = Support("age", "weight"), Support("age", "sex")
@@ -31,8 +31,8 @@ def scatter(qtbot, card) -> Scatter:
     scatter.show_visits(axes_of(AGE_WEIGHT, card), visits_of(AGE_WEIGHT, card))
     scatter.show_edge(remoteness(AGE_WEIGHT, card, HERE))
     scatter.show_place(100.0, 35.0)
-    around.show()
-    qtbot.waitExposed(around)
+    with qtbot.waitExposed(around):
+        around.show()
     scatter.around = around
     return scatter
 
@@ -115,7 +115,7 @@ def test_arrow_keys_move_the_ring_and_are_one_act(scatter, heard, qtbot):
     for key in (Qt.Key.Key_Right, Qt.Key.Key_Right, Qt.Key.Key_Up):
         QTest.keyClick(scatter, key)
     assert [kind for kind, _, _ in heard] == ["moved"] * 3
-    qtbot.waitUntil(lambda: heard[-1][0] == "settled", timeout=5 * SETTLE_MS)
+    qtbot.waitUntil(lambda: heard[-1][0] == "settled")
     assert heard[-1][1:] == pytest.approx((104, 35.9), abs=0.5)
 
 

@@ -37,8 +37,8 @@ def panel(qtbot: QtBot, card) -> cp.CovariatePanel:
     panel.show_atlas(card, LIGHT)
     panel.show_values(opened(ExplorerState(), card))
     panel.resize(cp.PANEL_WIDTH, 700)
-    panel.show()
-    qtbot.waitExposed(panel)
+    with qtbot.waitExposed(panel):
+        panel.show()
     return panel
 
 

@@ -12,6 +12,7 @@ from PySide6.QtGui import QColor
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
+from naisr_viewer.program.headless import pause
 from naisr_viewer.state.explorer import ExplorerState, opened, with_patient, with_values
 from naisr_viewer.state.patients import OpenScan, Reading, Scan
 from naisr_viewer.state.support import Support
@@ -30,8 +31,8 @@ def panel(qtbot: QtBot, card) -> CovariatePanel:
     panel.show_atlas(card, LIGHT)
     panel.show_values(opened(ExplorerState(), card))
     panel.resize(PANEL_WIDTH, HIGH_PX)
-    panel.show()
-    qtbot.waitExposed(panel)
+    with qtbot.waitExposed(panel):
+        panel.show()
     panel.support.prepare()
     return panel
 
@@ -47,16 +48,16 @@ def test_the_data_are_folded_where_there_is_no_room(panel, card, qtbot):
     support = panel.support
     assert support.chart.isVisible()
     panel.resize(PANEL_WIDTH, LOW_PX)
-    qtbot.waitUntil(lambda: not support.chart.isVisible(), timeout=2000)
+    qtbot.waitUntil(lambda: not support.chart.isVisible())
     panel.resize(PANEL_WIDTH, HIGH_PX)
-    qtbot.waitUntil(support.chart.isVisible, timeout=2000)
+    qtbot.waitUntil(support.chart.isVisible)
     panel.show_values(replace(opened(ExplorerState(), card), support=Support("age", "weight", False)))
     assert not support.chart.isVisible()
     panel.resize(PANEL_WIDTH, LOW_PX)
     panel.show_values(replace(opened(ExplorerState(), card), support=Support("age", "weight", True)))
     assert support.chart.isVisible()  # to be scrolled to; the sliders keep their place
     slider = panel.rows["age"].slider
-    qtbot.waitUntil(lambda: slider.visibleRegion().boundingRect() == slider.rect(), timeout=2000)
+    qtbot.waitUntil(lambda: slider.visibleRegion().boundingRect() == slider.rect())
 
 
 def test_folding_and_axes_are_asked_for(panel, asked, card):
@@ -114,15 +115,15 @@ def test_the_slider_says_where_there_are_data(panel, card):
 def test_the_edge_follows_the_covariates_that_are_not_on_the_axes(panel, card, qtbot):
     state = replace(opened(ExplorerState(), card), support=Support("age", "sex"))
     panel.show_values(state)
-    qtbot.wait(50)  # the axes take their room
+    pause(0.05)  # the axes take their room
     before = panel.support.chart.grab().toImage()
     panel.show_values(with_values(state, (("weight", 60.0),)))
-    qtbot.waitUntil(lambda: panel.support.chart.grab().toImage() != before, timeout=2000)
+    qtbot.waitUntil(lambda: panel.support.chart.grab().toImage() != before)
     nobody = with_values(state, (("weight", 95.0),))
     panel.show_values(replace(nobody, support=Support("sex", "age")))  # without an edge
     panel.support.chart.grab()
     panel.show_values(state)
-    qtbot.waitUntil(lambda: panel.support.chart.grab().toImage() == before, timeout=2000)
+    qtbot.waitUntil(lambda: panel.support.chart.grab().toImage() == before)
 
 
 def test_a_patient_is_told_from_others_by_colour(panel, card, qtbot):

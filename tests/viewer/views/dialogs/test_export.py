@@ -22,7 +22,7 @@ def state(card) -> ExplorerState:
     return opened(ExplorerState(), card)
 
 
-@pytest.mark.parametrize("layout", set(Layout) - {Layout.MATRIX})
+@pytest.mark.parametrize("layout", [each for each in Layout if each is not Layout.MATRIX])
 def test_all_views_are_proposed_as_they_are_on_screen(qtbot, card, state, layout):
     state = replace(state, layout=layout)
     dialog = ExportDialog(state)

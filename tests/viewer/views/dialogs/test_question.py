@@ -96,8 +96,8 @@ def test_a_tick_box_stands_out_from_its_ground(qtbot, theme: Theme, is_ticked):
     dialog = PreferencesDialog(dict.fromkeys(QUESTIONS, is_ticked))
     qtbot.addWidget(dialog)
     dialog.setStyleSheet(style_sheet(theme))
-    dialog.show()
-    qtbot.waitExposed(dialog)
+    with qtbot.waitExposed(dialog):
+        dialog.show()
     box = next(iter(dialog.boxes.values()))
     picture = box.grab().toImage()
     greys = [picture.pixelColor(x, box.height() // 2).lightness() for x in range(box.height())]

@@ -63,8 +63,8 @@ def panel(qtbot: QtBot, start) -> pp.PatientPanel:
     qtbot.addWidget(panel)
     panel.show_state(start)
     panel.resize(pp.PANEL_WIDTH, 1300)
-    panel.show()
-    qtbot.waitExposed(panel)
+    with qtbot.waitExposed(panel):
+        panel.show()
     panel.activateWindow()
     qtbot.waitUntil(panel.isActiveWindow)  # only then a click gives a field the focus
     return panel

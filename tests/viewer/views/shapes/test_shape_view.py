@@ -61,8 +61,8 @@ def view(qtbot: QtBot, card: AtlasCard, surfaces: Surfaces) -> Iterator[sv.Shape
     view.resize(900, 600)
     view.show_atlas(card, LIGHT)
     view.show_panels(panels_in(Layout.SIDE_BY_SIDE, card))
-    view.show()
-    qtbot.waitExposed(view)
+    with qtbot.waitExposed(view):
+        view.show()
     show(view, surfaces)
     yield view
     view.clear()
