@@ -77,11 +77,12 @@ def write_matrix(
     Raises:
         InputError: when one of them cannot be written.
     """
+    assert state.atlas is not None
     meshes = [
         (each.path, surface) for each, surface in zip(plan.cells, surfaces, strict=True) if has(surface)
     ]
     for path, surface in meshes:
-        write_mesh(path, surface)
+        write_mesh(path, surface, state.atlas)
     with replacing(plan.figure) as temporary:
         temporary.write_bytes(figure)
     text = json.dumps(record(plan, state, surfaces), indent=2, ensure_ascii=False) + "\n"

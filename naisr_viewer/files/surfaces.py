@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -15,7 +16,9 @@ from naisr_model.errors import InputError
 from naisr_model.exports import FORMATS, MeshFormat, format_named, mesh_bytes
 from naisr_model.files import replacing
 from naisr_viewer import __version__
+from naisr_viewer.panels.base import Numbers
 from naisr_viewer.panels.kinds import kind_of, title_of
+from naisr_viewer.panels.maps import numbers_of
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.patients import OpenScan
 from naisr_viewer.state.requests import Origin, SurfaceRequest, SurfaceResult
@@ -51,7 +54,7 @@ def write_surface(
         InputError: when there is no surface to write, or the ending or folder will not do.
     """
     beside = record_of(path)
-    write_mesh(path, result)
+    write_mesh(path, result, atlas)
     record = description(result, atlas, path.name, patient, reference)
     text = json.dumps(record, indent=2, ensure_ascii=False) + "\n"
     with replacing(beside) as temporary:
@@ -59,10 +62,10 @@ def write_surface(
     return path, beside
 
 
-def write_mesh(path: Path, result: SurfaceResult) -> None:
+def write_mesh(path: Path, result: SurfaceResult, atlas: AtlasCard) -> None:
     """Write a surface alone; otherwise as :func:`write_surface`."""
     ending = require_writable(path, result)
-    content = mesh_bytes(_triangles(result), ending)
+    content = mesh_bytes(_triangles(result, _at_vertices(result, atlas)), ending)
     with replacing(path) as temporary:
         temporary.write_bytes(content)
 
@@ -115,7 +118,7 @@ def description(
         "volume_cm3_is": OF_SCAN if is_scan else OF_SURFACE,
         "volume_of_triangles_cm3": round(_triangles(result).volume / 1000, 4) if len(result.faces) else None,
         "volume_95_percent_margin_cm3": None if margin is None else round(margin, 4),
-        "numbers": _numbers_record(result, format_named(Path(file_name))),
+        "numbers": _numbers_record(result, atlas, format_named(Path(file_name))),
         "patient": None if patient is None else patient_record(patient),
         "before": _before_record(request, atlas, reference),
         "vertices": len(result.points_mm),
@@ -129,24 +132,24 @@ OF_SURFACE = "of the smooth surface through the vertices, as in the window"
 OF_SCAN = "of the scan as it was read; the file holds it as it is shown, in the frame of the atlas"
 
 
-def _numbers(result: SurfaceResult) -> dict[str, NDArray[np.float32]]:
+def _numbers(request: SurfaceRequest, atlas: AtlasCard) -> Numbers:
+    """What the numbers on a surface are: those of the map that was asked for, else of the kind of view."""
+    return kind_of(request.panel).numbers if request.map is None else numbers_of(atlas, request.map)
+
+
+def _at_vertices(result: SurfaceResult, atlas: AtlasCard) -> dict[str, NDArray[np.float32]]:
     """What is known at the vertices, ``[n]``, by name with unit."""
     coloured = result.colouring
-    return {} if coloured is None else {kind_of(result.request.panel).array: coloured.values}
+    return {} if coloured is None else {_numbers(result.request, atlas).name: coloured.values}
 
 
-def _numbers_record(result: SurfaceResult, ending: MeshFormat | None) -> dict[str, Any] | None:
+def _numbers_record(
+    result: SurfaceResult, atlas: AtlasCard, ending: MeshFormat | None
+) -> dict[str, Any] | None:
     """What the numbers at the vertices are, and whether the file holds them."""
     if result.colouring is None:
         return None
-    kind = kind_of(result.request.panel)
-    return {
-        "name": kind.array,
-        "unit": kind.unit,
-        "meaning": kind.hint.replace("\n", " "),
-        "colour_scale_ends_at": round(result.colouring.limit, 4),
-        "in_file": ending in POINT_FORMATS,
-    }
+    return _numbers(result.request, atlas)._asdict() | {"in_file": ending in POINT_FORMATS}
 
 
 def _before_record(
@@ -166,11 +169,13 @@ def _covariate_records(atlas: AtlasCard, given: Mapping[str, float]) -> dict[str
     }
 
 
-def _triangles(result: SurfaceResult) -> trimesh.Trimesh:
+def _triangles(
+    result: SurfaceResult, at_vertices: Mapping[str, NDArray[np.float32]] = MappingProxyType({})
+) -> trimesh.Trimesh:
     import trimesh  # here, because it would slow down the start
 
     points = np.asarray(result.points_mm, dtype=np.float64)
-    numbers = cast("dict[str, ArrayLike]", _numbers(result))
+    numbers = cast("dict[str, ArrayLike]", dict(at_vertices))
     return trimesh.Trimesh(
         points, result.faces, vertex_normals=result.normals, vertex_attributes=numbers, process=False
     )

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState
@@ -23,6 +24,25 @@ Ask = Callable[[ExplorerState, Panel, int], SurfaceRequest]
 
 Measured = Callable[[SurfaceResult], Caption]
 """What is told of a surface that is there and can be trusted."""
+
+
+class Numbers(NamedTuple):
+    """What is known at each vertex of a surface.
+
+    Attributes:
+        name: what they are called in a file, with their unit: ``change_mm``.
+        unit: of them.
+        meaning: in words.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+
+
+def numbers(quantity: str, unit: str, meaning: str) -> Numbers:
+    """Numbers of a quantity, whose name has the characters that every format allows."""
+    return Numbers(re.sub(r"\W+", "_", f"{quantity}_{unit}"), unit, meaning.replace("\n", " "))
 
 
 @dataclass(frozen=True)
@@ -69,9 +89,9 @@ class PanelKind:
     is_modelled: bool = True
 
     @property
-    def array(self) -> str:
-        """What its numbers are called in a file, with their unit: ``change_mm``."""
-        return re.sub(r"\W+", "_", f"{self.quantity or self.name}_{self.unit}")
+    def numbers(self) -> Numbers:
+        """What those on its surface are by themselves."""
+        return numbers(self.quantity or self.name, self.unit, self.hint)
 
     def panels(self, atlas: AtlasCard) -> tuple[Panel, ...]:
         """All of this kind that an atlas can show."""

@@ -2,25 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from naisr_model.covariates import Covariate
+from naisr_viewer.panels.base import Numbers, numbers
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.overlay import Map, Quantity
-from naisr_viewer.words.maps import MILLIMETRES, rate_unit, told
-
-
-class Told(NamedTuple):
-    """Numbers on a surface.
-
-    Attributes:
-        unit: of them.
-        array: what they are called in a file.
-    """
-
-    unit: str
-    array: str
+from naisr_viewer.words.maps import HINTS, MILLIMETRES, rate_unit, told
 
 
 def can_map(atlas: AtlasCard) -> bool:
@@ -50,13 +37,14 @@ def map_of(state: ExplorerState, covariate: str = "") -> Map | None:
     return Map(quantity, covariate or state.touched or state.atlas.covariates[0].name)
 
 
-def told_of(atlas: AtlasCard, shown: Map) -> Told:
-    """Unit and name of the numbers of a map."""
+def numbers_of(atlas: AtlasCard, shown: Map) -> Numbers:
+    """What the numbers of a map are: ``displacement_mm``, ``rate_of_age_mm_per_month``."""
+    meaning = HINTS[shown.quantity]
     if shown.quantity is Quantity.DISPLACEMENT:
-        return Told(MILLIMETRES, "displacement_mm")
+        return numbers("displacement", MILLIMETRES, meaning)
     covariate = covariate_of(atlas, shown)
     kind = "contrast" if covariate.kind == "binary" else "rate"
-    return Told(rate_unit(covariate), f"{kind}_of_{covariate.name}")
+    return numbers(f"{kind}_of_{covariate.name}", rate_unit(covariate), meaning)
 
 
 def covariate_of(atlas: AtlasCard, shown: Map) -> Covariate:

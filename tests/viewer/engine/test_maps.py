@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from naisr_viewer.panels.kinds import request_for
-from naisr_viewer.panels.maps import map_of, told_of, words_of_maps
+from naisr_viewer.panels.maps import map_of, numbers_of, words_of_maps
 from naisr_viewer.panels.scales import PanelScale, fitted_limit, rounded_up, scale_of
 from naisr_viewer.state.explorer import ExplorerState, with_value
 from naisr_viewer.state.layouts import FULL_SHAPE, TEMPLATE, Layout, Panel
@@ -84,8 +84,8 @@ def test_what_is_asked_follows_what_was_moved_last(situation):
     assert map_of(seen(replace(state, touched=""), RATE)) == Map(RATE, "age")
     assert request_for(seen(state, RATE), SEX, 0).map == Map(RATE, "sex")
     assert request_for(seen(state, RATE), TEMPLATE, 0).map is None
-    assert told_of(state.atlas, Map(RATE, "age")).unit == "mm per year"
-    assert told_of(state.atlas, Map(RATE, "sex")).unit == "mm, M against F"
+    assert numbers_of(state.atlas, Map(RATE, "age")).unit == "mm per year"
+    assert numbers_of(state.atlas, Map(RATE, "sex")).unit == "mm, M against F"
     assert words_of_maps(seen(state, RATE)) == "Full shape: Age, mm per year"
 
 

@@ -18,6 +18,7 @@ from naisr_model.errors import InputError
 from naisr_model.exports import FORMATS
 from naisr_viewer.files import surfaces as export
 from naisr_viewer.state.layouts import FULL_SHAPE, Panel
+from naisr_viewer.state.overlay import Map, Quantity
 from naisr_viewer.state.requests import Colouring, Origin, SurfaceRequest, SurfaceResult
 
 VALUES = {"age": 150.0, "weight": 50.0, "sex": 1.0}
@@ -86,7 +87,7 @@ def test_numbers_on_a_surface_are_in_the_file_or_the_record_says_that_they_are_n
     change = coloured(result)
     path, beside = export.write_surface(tmp_path / f"change.{ending}", change, card)
     numbers = json.loads(beside.read_text(encoding="utf-8"))["numbers"]
-    assert (numbers["name"], numbers["unit"], numbers["colour_scale_ends_at"]) == ("change_mm", "mm", 3.0)
+    assert (numbers["name"], numbers["unit"]) == ("change_mm", "mm")
     assert numbers["in_file"] == (ending in ("ply", "vtp"))
     if ending == "vtp":
         np.testing.assert_array_equal(pv.read(path).point_data["change_mm"], changes(result))
@@ -96,6 +97,24 @@ def test_numbers_on_a_surface_are_in_the_file_or_the_record_says_that_they_are_n
     assert read(path).volume == pytest.approx(
         trimesh.Trimesh(result.points_mm, result.faces).volume, rel=1e-4
     )
+
+
+MAPS = {
+    Map(Quantity.DISPLACEMENT): ("displacement_mm", "mm"),
+    Map(Quantity.RATE, "age"): ("rate_of_age_mm_per_month", "mm per month"),
+    Map(Quantity.RATE, "sex"): ("contrast_of_sex_mm_M_against_F", "mm, M against F"),
+}
+
+
+@pytest.mark.parametrize("shown", MAPS)
+def test_numbers_of_a_map_are_called_what_they_are(result, card, tmp_path, shown):
+    request = replace(result.request, map=shown)
+    mapped = replace(result, request=request, colouring=Colouring(changes(result), 3.0, "signed"))
+    path, beside = export.write_surface(tmp_path / "map.vtp", mapped, card)
+    numbers = json.loads(beside.read_text(encoding="utf-8"))["numbers"]
+    name, unit = MAPS[shown]
+    assert (numbers["name"], numbers["unit"], numbers["in_file"]) == (name, unit, True)
+    np.testing.assert_array_equal(pv.read(path).point_data[name], changes(result))
 
 
 def test_a_change_records_what_it_is_counted_from(result, card):
