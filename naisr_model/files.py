@@ -192,6 +192,19 @@ def stamp_of(path: Path) -> Stamp:
     return facts.st_mtime_ns, facts.st_size
 
 
+def sha256_of(path: Path, kind: str = "") -> str:
+    """Of a file's content, hexadecimal; read piece by piece, however large it is.
+
+    Raises:
+        InputError: when it cannot be read; it says that it should be ``kind``.
+    """
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise InputError(why_unreadable(path, error, kind)) from error
+
+
 def sources_digest(*folders: Path) -> bytes:
     """SHA-256 of the Python sources in some folders: another one is another program, whatever its version."""
     sources = [file for folder in folders for file in sorted(folder.rglob("*.py"))]

@@ -6,7 +6,6 @@ where something did, and never stops the others.
 
 from __future__ import annotations
 
-import hashlib
 import io
 from pathlib import Path
 from typing import NamedTuple
@@ -20,7 +19,7 @@ from naisr_model.data.comparison import Bulk, measured
 from naisr_model.data.remarks import Remark
 from naisr_model.data.tables import TableRow, require_file
 from naisr_model.errors import InputError
-from naisr_model.files import replacing_folder
+from naisr_model.files import replacing_folder, sha256_of
 from naisr_model.frames import Frame
 
 
@@ -65,7 +64,7 @@ def inspect(job: tuple[TableRow, str]) -> Look:
                 raise InputError("the row has no landmarks file; alignment by landmarks needs one")
             require_file(row.landmarks)
             landmarks = align.read_landmarks(row.landmarks, file.space or "LPS")
-        digest = hashlib.sha256(row.mesh.read_bytes()).hexdigest()
+        digest = sha256_of(row.mesh)
         return Look(file.remarks, digest, file.space, measured(file.mesh_mm), landmarks)
     except InputError as error:
         return Look((Remark("refuse", "file", str(error)),))

@@ -8,7 +8,6 @@ of the same files.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import fields
@@ -20,7 +19,7 @@ from naisr_model.data.store import INDEX
 from naisr_model.errors import InputError
 from naisr_model.evaluation import journal as journals
 from naisr_model.evaluation.journal import Keep, Record, plain
-from naisr_model.files import sources_digest
+from naisr_model.files import sha256_of, sources_digest
 from naisr_model.progress import SILENT, Progress
 from naisr_model.work.run import processes
 
@@ -141,7 +140,7 @@ def _contents(value: Any) -> Any:
     if not isinstance(value, Path):
         return value
     file = value / INDEX if value.is_dir() else value
-    return hashlib.sha256(file.read_bytes()).hexdigest() if file.exists() else None
+    return sha256_of(file) if file.exists() else None
 
 
 def _keeping(

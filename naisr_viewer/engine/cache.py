@@ -25,7 +25,7 @@ from naisr_model import errors
 from naisr_model.capabilities import Capabilities
 from naisr_model.covariates import Population
 from naisr_model.errors import InputError
-from naisr_model.files import replacing, sources_digest, why_unreadable
+from naisr_model.files import replacing, sha256_of, sources_digest
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.layouts import FULL_SHAPE, TEMPLATE
 from naisr_viewer.state.requests import EXACT_RESOLUTION, Origin, SurfaceRequest, SurfaceResult
@@ -58,12 +58,7 @@ def fingerprint_of(path: Path) -> str:
     Raises:
         InputError: when the file cannot be read.
     """
-    try:
-        with path.open("rb") as file:  # piece by piece: anything may have been opened, however large
-            contents = hashlib.file_digest(file, "sha256").digest()
-    except OSError as error:
-        raise InputError(why_unreadable(path, error, "an atlas")) from error
-    return hashlib.sha256(program_digest() + contents).hexdigest()[:32]
+    return hashlib.sha256(program_digest() + sha256_of(path, "an atlas").encode()).hexdigest()[:32]
 
 
 @lru_cache(maxsize=1)

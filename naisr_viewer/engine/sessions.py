@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -11,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from naisr_model.errors import InputError
-from naisr_model.files import stamp_of
+from naisr_model.files import sha256_of, stamp_of
 from naisr_model.progress import SILENT, Progress
 from naisr_model.shipped import shipped
 from naisr_viewer.engine.clinic import Clinic
@@ -86,19 +85,6 @@ def restored(engine: Engine, clinic: Clinic, session: Session, progress: Progres
         patients += [] if patient is None else [patient]
         notes += said
     return Restored(session, card, tuple(patients), tuple(notes))
-
-
-def sha256_of(path: Path) -> str:
-    """Of a file's content, hexadecimal.
-
-    Raises:
-        InputError: when it cannot be read.
-    """
-    try:
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError as error:
-        raise InputError(f"cannot read {path}: {error.strerror or error}") from error
 
 
 def _atlas_of(saved: SavedAtlas) -> tuple[Path, list[str]]:
