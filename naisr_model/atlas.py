@@ -709,9 +709,8 @@ class Individual:
         """
         points = np.asarray(points_mm)
         sd_mm = self.surface_margin_mm(points) / TWO_SIDED_95
-        noise_mm = self.posterior.noise * self.atlas.frame.scale_mm
         away_mm = self.atlas.sdf(points, self.covariates, self.latent)
-        return np.asarray(np.abs(away_mm) > UNEXPRESSED * np.hypot(sd_mm, noise_mm))
+        return np.asarray(np.abs(away_mm) > UNEXPRESSED * np.hypot(sd_mm, self.noise_mm))
 
     @cached_property
     def surface(self) -> trimesh.Trimesh:

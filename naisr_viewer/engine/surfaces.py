@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from naisr_viewer.state.patients import Scan
 from naisr_viewer.state.requests import Origin, SurfaceRequest, SurfaceResult
 
 if TYPE_CHECKING:
@@ -49,6 +50,19 @@ def from_tracked(request: SurfaceRequest, tracker: Tracker, tracked: Tracked, st
     )
 
 
+def from_scan(request: SurfaceRequest, scan: Scan, start: float) -> SurfaceResult:
+    """A scan as it was read, as the answer to ``request``, begun at ``start`` on the performance counter."""
+    return SurfaceResult(
+        request=request,
+        points_mm=scan.points_mm,
+        normals=scan.normals,
+        faces=scan.faces,
+        volume_cm3=scan.volume_cm3 or 0.0,
+        seconds=time.perf_counter() - start,
+        origin=Origin.MEASURED,
+    )
+
+
 def volume_cm3(points_mm: NDArray, normals: NDArray, faces: NDArray[np.int64]) -> float:
     """What a surface encloses: vertices and unit normals there ``[n, 3]``, triangles ``[m, 3]``."""
     from naisr_model.surface.volume import enclosed_volume
@@ -63,6 +77,16 @@ def deviation_mm(points_mm: NDArray[np.float32], exact: SurfaceResult) -> float:
     nearest = cKDTree(exact.points_mm).query(points_mm)[1]
     offsets = points_mm - exact.points_mm[nearest]
     return float(np.quantile(np.abs(np.sum(offsets * exact.normals[nearest], axis=1)), 0.99))
+
+
+def outside_mm(one: SurfaceResult | Scan, other: SurfaceResult | Scan) -> NDArray[np.float32]:
+    """Distance of the vertices of one surface to another surface, positive outside it, ``[n]``."""
+    import trimesh
+
+    from naisr_model.data.samples import signed_distance
+
+    mesh_mm = trimesh.Trimesh(other.points_mm, other.faces, process=False)
+    return signed_distance(mesh_mm, one.points_mm.astype(np.float64)).astype(np.float32)
 
 
 def at_nearest(

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from naisr_model.progress import Progress
 from naisr_viewer.engine.answers.base import Answer, Source
-from naisr_viewer.engine.surfaces import limit_mm
+from naisr_viewer.engine.surfaces import limit_mm, outside_mm
 from naisr_viewer.state.layouts import FULL_SHAPE
 from naisr_viewer.state.requests import Colouring, SurfaceRequest, SurfaceResult
 
@@ -26,18 +23,7 @@ def _give(source: Source, request: SurfaceRequest, progress: Progress) -> Surfac
     if not (len(shape.faces) and len(average.faces)):
         return shape
     limit = limit_mm(source.atlas(request.atlas), SHARE)
-    return replace(shape, colouring=Colouring(_outside_mm(shape, average), limit, "signed"))
-
-
-def _outside_mm(shape: SurfaceResult, average: SurfaceResult) -> NDArray[np.float32]:
-    """Distance of the vertices of one surface to another, positive outside it, ``[n]``."""
-    import trimesh
-
-    from naisr_model.data.samples import signed_distance
-
-    mesh_mm = trimesh.Trimesh(average.points_mm, average.faces, process=False)
-    outside_mm = signed_distance(mesh_mm, shape.points_mm.astype(np.float64))
-    return outside_mm.astype(np.float32)
+    return replace(shape, colouring=Colouring(outside_mm(shape, average), limit, "signed"))
 
 
 ANSWER = Answer(_give)

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 
 from naisr_model.progress import Progress
 from naisr_viewer.engine.answers.base import Answer, Source
 from naisr_viewer.engine.people import FittedPerson
-from naisr_viewer.engine.surfaces import limit_mm
+from naisr_viewer.engine.surfaces import from_scan, limit_mm
 from naisr_viewer.state.patients import Named
-from naisr_viewer.state.requests import EXACT_RESOLUTION, Colouring, Origin, SurfaceRequest, SurfaceResult
+from naisr_viewer.state.requests import EXACT_RESOLUTION, Colouring, SurfaceRequest, SurfaceResult
 
 SHARE = 0.02
 """End of the colour scale, see :func:`~naisr_viewer.engine.surfaces.limit_mm`."""
@@ -20,19 +21,11 @@ SHARE = 0.02
 def _give(source: Source, request: SurfaceRequest, _progress: Progress) -> SurfaceResult:
     start, fitted = time.perf_counter(), source.who(request.atlas, request.person).fitted
     assert fitted is not None
-    is_exact, scan = request.resolution >= EXACT_RESOLUTION, fitted.scan
-    colouring = _distances(fitted, request.values) if is_exact else None
-    return SurfaceResult(
-        request=request,
-        points_mm=scan.points_mm,
-        normals=scan.normals,
-        faces=scan.faces,
-        volume_cm3=scan.volume_cm3 or 0.0,
-        seconds=time.perf_counter() - start,
-        origin=Origin.MEASURED,
-        colouring=colouring,
-        unexpressed=_unexpressed(fitted, request.values) if is_exact else None,
-    )
+    found = from_scan(request, fitted.scan, start)
+    if request.resolution < EXACT_RESOLUTION:
+        return found
+    distances = _distances(fitted, request.values)
+    return replace(found, colouring=distances, unexpressed=_unexpressed(fitted, request.values))
 
 
 def _distances(fitted: FittedPerson, values: Named) -> Colouring:
