@@ -92,8 +92,11 @@ def session_of(state: ExplorerState, camera: Camera | None, window_px: tuple[int
 
 
 def state_of(session: Session, card: AtlasCard, patients: tuple[OpenScan, ...]) -> ExplorerState:
-    """The situation of a session with its atlas and its patients; of who could not be read it is silent."""
-    keys = {each.key for each in patients}
+    """The situation of a session with its atlas and its patients; of who could not be read it is silent.
+
+    So it is of covariates that the atlas, as it is now, has not.
+    """
+    keys, names = {each.key for each in patients}, {each.name for each in card.covariates}
     state = session.state
     return with_possible_layout(
         replace(
@@ -104,6 +107,8 @@ def state_of(session: Session, card: AtlasCard, patients: tuple[OpenScan, ...]) 
             patient=state.patient if state.patient in keys else None,
             compared=state.compared if state.compared in keys | {AVERAGE_KEY} else None,
             support=suited(state.support, card),
+            muted=tuple(name for name in state.muted if name in names),
+            touched=state.touched if state.touched in names else "",
         )
     )
 
