@@ -84,6 +84,10 @@ class Tracker(Protocol):
     def faces(self) -> NDArray[np.int64]:
         """Vertex numbers of the triangles, ``[m, 3]``; the same for every shape."""
 
+    @property
+    def template_points_mm(self) -> NDArray[np.float32]:
+        """The template's vertices, ``[n, 3]``, in the order in which they are carried."""
+
     def track(self, values: Values, start: Tracked | None = None) -> Tracked:
         """Carry the template to ``values``; from a shape nearby, ``start``, in fewer steps.
 
@@ -116,6 +120,11 @@ class CodeTracker:
     template_slopes: Tensor
     template_values: Tensor
     faces: NDArray[np.int64]
+
+    @property
+    def template_points_mm(self) -> NDArray[np.float32]:
+        """As :attr:`Tracker.template_points_mm`."""
+        return self.frame.to_mm(_columns(self.template_points)).astype(np.float32)
 
     def track(self, values: Values, start: Tracked | None = None) -> Tracked:
         """As :meth:`Tracker.track`."""
@@ -163,6 +172,11 @@ class FadingTracker:
     def faces(self) -> NDArray[np.int64]:
         """As :attr:`Tracker.faces`."""
         return self.far.faces
+
+    @property
+    def template_points_mm(self) -> NDArray[np.float32]:
+        """As :attr:`Tracker.template_points_mm`."""
+        return self.far.template_points_mm
 
     def track(self, values: Values, start: Tracked | None = None) -> Tracked:
         """As :meth:`Tracker.track`."""

@@ -83,7 +83,7 @@ def _by_tables(
     from naisr_model.surface.tracking import Tracked
 
     if covariate is None:
-        return _along(shape.points_mm - tracker.track({}).points_mm, shape)
+        return _along(shape.points_mm - tracker.template_points_mm, shape)
     low, high = _ends(dict(values), covariate)
     here = Tracked(shape.points_mm, shape.normals, 0.0, False)  # which is nearly there
     before, after = (tracker.track({**dict(values), covariate.name: end}, here) for end in (low, high))

@@ -63,6 +63,7 @@ class EllipsoidTracker:
         self.template, self.gate = template, gate
         self.began = 0
         self.faces = np.asarray(template.faces, np.int64)
+        self.template_points_mm = np.asarray(template.vertices, np.float32)
 
     def track(self, values, start=None):
         self.began += 1
