@@ -16,7 +16,7 @@ from naisr_model.progress import SILENT, Progress
 from naisr_viewer.engine.answers.base import Who
 from naisr_viewer.engine.answers.kinds import ANSWERS
 from naisr_viewer.engine.atlases import Atlases, Opened, Read, load_atlas
-from naisr_viewer.engine.cache import Cache, Opening, cache_folder, first_picture
+from naisr_viewer.engine.cache import Cache, Opening, cache_folder, fingerprint_of, first_picture
 from naisr_viewer.engine.norms import KnownNorms
 from naisr_viewer.engine.people import FittedPerson
 from naisr_viewer.engine.previews import Previews
@@ -92,11 +92,10 @@ class Engine:
         Raises:
             InputError: when there is no such file or it is not an atlas of surfaces.
         """
-        read = self.read(path)
         with contextlib.suppress(Cancelled):
-            if (open_already := self._atlases[path]).fingerprint == read[0].fingerprint:
+            if (open_already := self._atlases[path]).fingerprint == fingerprint_of(path):
                 return open_already.card
-        return self.begin(read)
+        return self.open(path)
 
     def was_kept(self, path: Path) -> bool:
         """Whether the first picture of an open atlas came from the cache."""
