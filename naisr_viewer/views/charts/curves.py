@@ -4,26 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 import pyqtgraph
-from PySide6.QtCore import QBuffer, QIODevice, QPoint, QPointF, QRect, QRectF, QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter
+from PySide6.QtCore import QBuffer, QIODevice, QPoint, QRect, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QPainter
 from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import QWidget
 
 from naisr_model.covariates import Covariate
 from naisr_viewer.state.curves import Curves, MeasureCurve, Numbers
-from naisr_viewer.views.charts.chart import Chart
-from naisr_viewer.views.charts.scatter import GOLDEN, SETTLE_MS, STREWN, chosen, key_step
+from naisr_viewer.views.charts.draggable import GOLDEN, STREWN, DraggableChart, Place, extent
 from naisr_viewer.views.elided import shortened
 from naisr_viewer.views.theme import LIGHT, Theme
 from naisr_viewer.words import curves as words
 from naisr_viewer.words.titles import label
 
 GRASP_PX = 8.0
-"""Who presses so near to the line takes hold of it; elsewhere it comes to where is pressed."""
-
 BAND_ALPHA, DOT_ALPHA = 46, 95
 DOT_PX, SIGHTING_PX = 4, 9
-MARGIN, BEYOND_LEVELS = 0.02, 1.6
+MARGIN = 0.02
 LEVEL_PX = 90
 TITLE_PX = 18
 """Above the curves, for what the axes are."""
@@ -31,37 +28,27 @@ TITLE_PX = 18
 PICTURE = QSize(720, 440)
 """Of an SVG."""
 
-STEPS = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
 
-
-class CurveChart(Chart):
+class CurveChart(DraggableChart):
     """The population's curve with its band, people as dots, a patient, and the line.
 
     Args:
         parent: the widget around it.
     """
 
-    value_moved = Signal(float)  # real value of the covariate: the line is on its way
-    value_settled = Signal(float)  # the same: it came to rest
-
     def __init__(self, parent: QWidget) -> None:
-        super().__init__(parent)
+        super().__init__(parent, GRASP_PX, LEVEL_PX)
         self.setAccessibleName("Measure along a covariate")
         self.plotItem.setContentsMargins(4, TITLE_PX, 8, 2)
-        self._theme, self._colours = LIGHT, (LIGHT.accent, LIGHT.accent)
-        self._covariate: Covariate | None = None
+        self._colours = (LIGHT.accent, LIGHT.accent)
         self._curve: MeasureCurve | None = None
-        self._place = self._grasp = 0.0
-        self._is_held = self._is_labelled = False
-        self._pending: float | None = None
+        self._is_labelled = False
         self._low, self._high, self._usual, self._path, self._own = (_line() for _ in range(5))
         self._band = pyqtgraph.FillBetweenItem(self._low, self._high)
         self._dots = pyqtgraph.ScatterPlotItem(size=DOT_PX, pen=None, antialias=True)
         self._interval = pyqtgraph.ErrorBarItem(x=np.zeros(0), y=np.zeros(0))
         self._sighting = pyqtgraph.ScatterPlotItem(size=SIGHTING_PX, antialias=True)
         self._here = pyqtgraph.InfiniteLine(movable=False)
-        self._settle = QTimer(self, singleShot=True, interval=SETTLE_MS)
-        self._settle.timeout.connect(self._settled)
         people = (self._band, self._dots, self._path, self._usual)
         for depth, item in enumerate((*people, self._own, self._interval, self._sighting, self._here)):
             item.setZValue(10 * depth)
@@ -78,7 +65,7 @@ class CurveChart(Chart):
             curve: which.
             colours: of the covariate and of the patient.
         """
-        self._covariate, self._curve, self._colours = covariate, curve, colours
+        self._covariates, self._curve, self._colours = (covariate,), curve, colours
         lines = {self._usual: curve.usual, self._path: curve.path, self._own: curve.own}
         ends = curve.band or (None, None)
         for item, values in (lines | {self._low: ends[0], self._high: ends[1]}).items():
@@ -88,35 +75,23 @@ class CurveChart(Chart):
         for item, known in (drawn | {self._dots: curve.observed}).items():
             item.setVisible(known is not None)
         self._show_sighting(curve)
-        self.setXRange(*_extent(covariate), padding=0)
+        self.setXRange(*extent(covariate, MARGIN), padding=0)
         self.setYRange(*_span(curve), padding=0.04)
         self.plotItem.getAxis("bottom").setTicks(self._ticks(covariate))
         self._colour()
 
-    def show_place(self, value: float) -> None:
-        """Put the line at the real value of what is on screen, without telling anybody."""
-        self._place = value
-        self._here.setPos(value)
+    def _put_mark(self, place: Place) -> None:
+        self._here.setPos(*place)
 
     def set_theme(self, theme: Theme) -> None:
         """Follow the theme."""
         super().set_theme(theme)
-        self._theme = theme
         self._colour()
-
-    def forget_move(self) -> None:
-        """Say no more of a movement that has not come to rest."""
-        self._settle.stop()
-        self._is_held, self._pending = False, None
-
-    def pixel_of(self, value: float) -> float:
-        """Where a value of the covariate is, in pixels of the widget from its left."""
-        return float(self.plotItem.vb.mapViewToScene(QPointF(value, 0)).x())
 
     def drawForeground(self, painter: QPainter, rect: QRectF | QRect) -> None:
         """What the axes are: the measure above, the covariate at the far end."""
         super().drawForeground(painter, rect)
-        if self._covariate is None or self._curve is None or self._is_labelled:
+        if self._curve is None or self._is_labelled:
             return
         room = self.plotItem.vb.sceneBoundingRect()
         half = round(room.width() / 2)
@@ -124,70 +99,20 @@ class CurveChart(Chart):
         painter.setPen(QColor(self._theme.muted))
         for text, side in (
             (words.axis(self._curve), Qt.AlignmentFlag.AlignLeft),
-            (_along(self._covariate), Qt.AlignmentFlag.AlignRight),
+            (_along(*self._covariates), Qt.AlignmentFlag.AlignRight),
         ):
             seen = shortened(text, self.fontMetrics(), half)
             painter.drawText(box, side | Qt.AlignmentFlag.AlignVCenter, seen)
 
     def label_axes(self) -> None:
         """Say at the axes themselves what they are, where there is room for that."""
-        assert self._covariate is not None
         assert self._curve is not None
         colour = {"color": self._theme.text}
-        self.plotItem.setLabel("bottom", _along(self._covariate), **colour)
+        self.plotItem.setLabel("bottom", _along(*self._covariates), **colour)
         self.plotItem.setLabel("left", words.axis(self._curve), **colour)
         self.plotItem.layout.activate()  # now, not by the next event
         self._dots.opts["useCache"] = self._sighting.opts["useCache"] = False  # as shapes, not as pixels
         self._is_labelled = True
-
-    def mousePressEvent(self, event: QMouseEvent) -> None:
-        """Take hold of the line, or have it come."""
-        scene = self.mapToScene(event.position().toPoint())
-        if event.button() != Qt.MouseButton.LeftButton or self._covariate is None:
-            return
-        if not self.plotItem.vb.sceneBoundingRect().contains(scene):
-            return
-        away = self.pixel_of(self._place) - event.position().x()
-        is_near = abs(away) <= GRASP_PX
-        self._is_held, self._grasp = True, away if is_near else 0.0
-        if not is_near:
-            self._go_to(event.position().x())
-
-    def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        """Take the line along."""
-        if self._is_held:
-            self._go_to(event.position().x() + self._grasp)
-
-    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        """Let go of it."""
-        if event.button() == Qt.MouseButton.LeftButton and self._is_held:
-            self._is_held = False
-            self._settled()
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Arrows move the line."""
-        if event.key() not in STEPS or self._covariate is None:
-            event.ignore()
-            return
-        self._move(self._place + STEPS[Qt.Key(event.key())] * key_step(self._covariate))
-        self._settle.start()
-
-    def _go_to(self, pixel: float) -> None:
-        self._settle.stop()
-        self._move(float(self.plotItem.vb.mapSceneToView(QPointF(pixel, 0)).x()))
-
-    def _move(self, value: float) -> None:
-        assert self._covariate is not None
-        goal = chosen(self._covariate, value)
-        if goal != self._place:
-            self._pending = goal
-            self.value_moved.emit(goal)
-
-    def _settled(self) -> None:
-        self._settle.stop()
-        if self._pending is not None:
-            value, self._pending = self._pending, None
-            self.value_settled.emit(value)
 
     def _show_sighting(self, curve: MeasureCurve) -> None:
         seen = () if curve.sighting is None else (curve.sighting,)
@@ -211,13 +136,6 @@ class CurveChart(Chart):
         self._sighting.setBrush(patient)
         self._sighting.setPen(pyqtgraph.mkPen(self._theme.raised))
         self._here.setPen(pyqtgraph.mkPen(self._theme.accent, width=1.5))
-
-    def _ticks(self, covariate: Covariate) -> list[list[tuple[float, str]]] | None:
-        """Levels by their names; None leaves numbers to the axis."""
-        if covariate.kind == "continuous":
-            return None
-        names = (shortened(name, self.fontMetrics(), LEVEL_PX) for name in covariate.levels)
-        return [list(zip((-1.0, 1.0), names, strict=True))]
 
 
 def picture(chart: CurveChart) -> bytes:
@@ -256,15 +174,6 @@ def _strewn(visits: Numbers, covariate: Covariate) -> Numbers:
     """Visits of which those at one level do not hide each other."""
     shift = STREWN * (2 * np.modf(np.arange(len(visits)) * GOLDEN)[0] - 1)
     return visits + shift if covariate.kind == "binary" else visits
-
-
-def _extent(covariate: Covariate) -> tuple[float, float]:
-    """What is seen of the axis of a covariate."""
-    low, high = covariate.range
-    if covariate.kind == "binary":
-        return -BEYOND_LEVELS, BEYOND_LEVELS
-    margin = MARGIN * (high - low)
-    return low - margin, high + margin
 
 
 def _span(curve: MeasureCurve) -> tuple[float, float]:

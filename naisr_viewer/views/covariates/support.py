@@ -83,8 +83,8 @@ class SupportPanel(QWidget):
         self.chart.setMaximumHeight(TALLEST_PX)
         self.chart.setToolTip(as_tip(words.HINT))
         self.chart.set_theme(self._theme)
-        self.chart.place_moved.connect(lambda *place: self.values_moved.emit(self._named(place)))
-        self.chart.place_settled.connect(lambda *place: self.values_settled.emit(self._named(place)))
+        self.chart.moved.connect(lambda place: self.values_moved.emit(self._named(place)))
+        self.chart.settled.connect(lambda place: self.values_settled.emit(self._named(place)))
         self._inside.insertWidget(1, self.chart, 1)
         self.chart.show()  # a layout does so by the next event only
         in_order(self.stops)

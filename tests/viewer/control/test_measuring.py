@@ -54,8 +54,8 @@ def test_dragging_the_line_is_dragging_the_slider(ready, qtbot):
     window, controller = ready
     chart = open_curve(window, controller, qtbot)
     before, told = controller.state.values, text(window)
-    start = QPoint(round(chart.pixel_of(before[0])), chart.height() // 2)
-    goal = QPoint(round(chart.pixel_of(8.0)), start.y())
+    start = QPoint(round(chart.place_of(before[0]).x()), chart.height() // 2)
+    goal = QPoint(round(chart.place_of(8.0).x()), start.y())
     QTest.mousePress(chart.viewport(), LEFT, pos=start)
     for x in np.linspace(start.x(), goal.x(), 4)[1:]:
         QTest.mouseMove(chart.viewport(), QPoint(round(x), start.y()))

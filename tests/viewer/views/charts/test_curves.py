@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QWidget
 
 from naisr_viewer.state.curves import CurveRequest, Curves, MeasureCurve, Sighting
 from naisr_viewer.views.charts.curves import CurveChart, picture
-from naisr_viewer.views.charts.scatter import SETTLE_MS
+from naisr_viewer.views.charts.draggable import SETTLE_MS
 from naisr_viewer.views.theme import DARK, LIGHT
 from naisr_viewer.words.curves import told
 
@@ -55,14 +55,14 @@ def chart(qtbot, atlas) -> CurveChart:
 def heard(chart) -> list[tuple[str, float]]:
     """What it says, and whoever hears it puts the line there."""
     acts: list[tuple[str, float]] = []
-    chart.value_moved.connect(lambda value: acts.append(("moved", value)))
-    chart.value_moved.connect(chart.show_place)
-    chart.value_settled.connect(lambda value: acts.append(("settled", value)))
+    chart.moved.connect(lambda place: acts.append(("moved", *place)))
+    chart.moved.connect(lambda place: chart.show_place(*place))
+    chart.settled.connect(lambda place: acts.append(("settled", *place)))
     return acts
 
 
 def at(chart: CurveChart, value: float) -> QPoint:
-    return QPoint(round(chart.pixel_of(value)), chart.height() // 2)
+    return QPoint(round(chart.place_of(value).x()), chart.height() // 2)
 
 
 def test_the_line_is_dragged_and_does_not_jump_under_the_pointer(chart, heard):

@@ -41,9 +41,9 @@ def scatter(qtbot, card) -> Scatter:
 def heard(scatter) -> list[tuple[str, float, float]]:
     """What it says, and whoever hears it puts the ring there."""
     acts: list[tuple[str, float, float]] = []
-    scatter.place_moved.connect(lambda x, y: acts.append(("moved", x, y)))
-    scatter.place_moved.connect(scatter.show_place)
-    scatter.place_settled.connect(lambda x, y: acts.append(("settled", x, y)))
+    scatter.moved.connect(lambda place: acts.append(("moved", *place)))
+    scatter.moved.connect(lambda place: scatter.show_place(*place))
+    scatter.settled.connect(lambda place: acts.append(("settled", *place)))
     return acts
 
 
