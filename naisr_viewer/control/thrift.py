@@ -13,12 +13,19 @@ from naisr_viewer.control.refinement import Refinement
 REST_MS = 1000
 """So long nothing happens before anything is given back: it takes some hundredths of a second."""
 
+BUSY_MS = 5000
+"""So often what is new is looked through meanwhile: it takes some milliseconds."""
+
+YOUNG = 1
+"""The older of the collector's two generations of new objects."""
+
 
 class Thrift(QObject):
     """Collects what nobody refers to and hands free memory back to the system.
 
-    A mesh and what belongs to it refer to each other, so only the garbage collector frees them; by itself it
-    looks seldom, as it counts objects and not their size.
+    A mesh and what belongs to it refer to each other, so only the garbage collector frees them. By itself it
+    would run in whichever thread makes an object, and a closed dialog must not be deleted by a worker: so it
+    is off, and runs here, in the window's thread.
 
     Args:
         refinement: tells when it is at rest, and whether it still is.
@@ -30,10 +37,14 @@ class Thrift(QObject):
         self._rest = QTimer(self, singleShot=True, interval=REST_MS)
         self._rest.timeout.connect(self._give_back)
         refinement.rested.connect(self._rest.start)
+        self._meanwhile = QTimer(self, interval=BUSY_MS)
+        self._meanwhile.timeout.connect(lambda: gc.collect(YOUNG))
+        self._meanwhile.start()
 
     def close(self) -> None:
         """Nothing happens afterwards."""
         self._rest.stop()
+        self._meanwhile.stop()
 
     def _give_back(self) -> None:
         if self._refinement.is_busy:

@@ -72,7 +72,7 @@ def make_engine(device: str) -> Engine:
     """
     leave_a_core_to_the_window()
     remember_few_kernels()
-    gc.set_threshold(50_000)  # imports make many objects that stay: seldom worth looking through
+    gc.disable()  # a worker could come to delete what is Qt's, which aborts the program; see control/thrift
     require_device(device)
     return Engine(partial(load_atlas, device=device))
 
