@@ -7,6 +7,7 @@ from pathlib import Path
 
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.camera import Camera
+from naisr_viewer.state.curves import FIRST_CURVE
 from naisr_viewer.state.explorer import AVERAGE_KEY, ExplorerState, with_possible_layout
 from naisr_viewer.state.matrix import kept_matrix
 from naisr_viewer.state.patients import Named, OpenScan, Reading
@@ -108,6 +109,7 @@ def state_of(session: Session, card: AtlasCard, patients: tuple[OpenScan, ...]) 
             compared=state.compared if state.compared in keys | {AVERAGE_KEY} else None,
             support=suited(state.support, card),
             muted=tuple(name for name in state.muted if name in names),
+            curve=state.curve if state.curve.covariate in names | {""} else FIRST_CURVE,
             touched=state.touched if state.touched in names else "",
         )
     )

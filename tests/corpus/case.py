@@ -94,7 +94,7 @@ class Case:
         make: the files of the case from the good ones; draws from the generator that it is given.
         words: what stands after ``naisr``; for the window the file to open.
         expected: how it has to end.
-        program: the command, or the window that opens a scan or an atlas.
+        program: the command, or the window that opens a scan, an atlas or a session.
     """
 
     kind: str
@@ -102,7 +102,7 @@ class Case:
     make: Callable[[Goods, Generator], Files]
     words: tuple[str, ...]
     expected: Expected
-    program: Literal["naisr", "scan", "atlas"] = "naisr"
+    program: Literal["naisr", "scan", "atlas", "session"] = "naisr"
 
     @property
     def id(self) -> str:

@@ -2,7 +2,19 @@
 
 from __future__ import annotations
 
-from corpus import checkpoints, clouds, landmarks, meshes, options, settings, stores, tables, volumes, window
+from corpus import (
+    checkpoints,
+    clouds,
+    landmarks,
+    meshes,
+    options,
+    sessions,
+    settings,
+    stores,
+    tables,
+    volumes,
+    window,
+)
 from corpus.case import Case
 
 TITLES = {
@@ -16,13 +28,14 @@ TITLES = {
     "state": "half-done trainings",
     "settings": "settings of a training",
     "options": "options",
+    "session": "sessions of the window",
     "window": "files opened in the window",
 }
 """What is damaged, by kind of case."""
 
 _MODULES = (
     *(meshes, volumes, clouds, tables, landmarks),
-    *(checkpoints, stores, settings, options, window),
+    *(checkpoints, stores, settings, options, sessions, window),
 )
 
 CASES: tuple[Case, ...] = tuple(case for module in _MODULES for case in module.CASES)

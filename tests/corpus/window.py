@@ -49,10 +49,10 @@ def _seen(job: Job) -> tuple[str, bool]:
         if job.program == "atlas":
             controller.open(path)
         else:
-            window.scan_requested.emit(path)
+            (window.scan_requested if job.program == "scan" else window.session_requested).emit(path)
         _rest(window, controller)
         atlas = controller.state.atlas
-        is_shown = bool(controller.state.patients) or (atlas is not None and atlas.path == path)
+        is_shown = bool(controller.state.patients) or (atlas is not None and atlas.path != job.atlas)
         window.deleteLater()
         return window.error_text.text() or "; ".join(asked), is_shown
 
@@ -70,7 +70,7 @@ def _told(message: str, is_shown: bool) -> int:
     if not message and not is_shown:
         raise RuntimeError("neither the file nor a message is shown")
     if message:
-        print(f"naisr-viewer: {message}", file=sys.stderr)
+        print(f"naisr-viewer: {message}".replace("\n", " "), file=sys.stderr)
     return 0 if is_shown else 2
 
 
