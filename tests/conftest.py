@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
 import pytest
@@ -83,3 +84,20 @@ def egg_deepsdf(egg_store: SampleStore, made_once) -> Path:
     file = "eggs.safetensors"
     preset = egg_deepsdf_preset(epochs=60)
     return Path(made_once("egg-deepsdf", lambda out: train(egg_store, preset, out / file)) / file)
+
+
+@pytest.fixture
+def no_room() -> Callable[[int], AbstractContextManager[None]]:
+    """``with no_room(bytes):`` no file grows beyond that, as on a full disk; nor of processes begun there."""
+    resource = pytest.importorskip("resource", reason="there is no limit for files")
+
+    @contextmanager
+    def limited(most: int) -> Iterator[None]:
+        hard = resource.getrlimit(resource.RLIMIT_FSIZE)[1]
+        resource.setrlimit(resource.RLIMIT_FSIZE, (most, hard))
+        try:
+            yield
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (hard, hard))
+
+    return limited

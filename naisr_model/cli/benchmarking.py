@@ -35,5 +35,5 @@ def bench(
     scope = QUICK if quick else Scope()
     with bar("measuring") as progress:
         record = run(atlas or shipped_atlas(), scope, device=device, progress=progress)
-    write_json(json_file, record)
     print(markdown(record, scope))
+    write_json(json_file, record)

@@ -154,7 +154,7 @@ def stoppable() -> Iterator[Progress]:
 
 
 def write_json(path: Path | None, record: object) -> None:
-    """Write the figures where a file was named."""
+    """Write the figures where a file was named; last of all, so that they are told even where that fails."""
     if path is not None:
         with replacing(path) as temporary:
             temporary.write_text(json.dumps(record, indent=1), encoding="utf-8")

@@ -32,8 +32,8 @@ def _command(name: str, kind: type[Study[Any]]) -> Callable[..., None]:
             raise InputError(f"{journal} is to be the journal and the report; name two files")
         with bar(name) as progress:
             report = run(study, workers=workers, journal=journal, progress=progress)
-        write_json(json_file, report)
         print(study.markdown(report))
+        write_json(json_file, report)
 
     measure.__annotations__["study"] = Annotated[kind, Parameter(name="*")]
     return measure

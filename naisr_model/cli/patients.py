@@ -69,15 +69,15 @@ def fit(
 ) -> None:
     """Fit a patient's shape: covariates that are not given are inferred, all with 95 % intervals."""
     from naisr_model.patients.evolution import fit_record
-    from naisr_model.patients.series import write_series
+    from naisr_model.patients.series import series_records, write_series
 
     _require_own(out, patient)
     fitted, intake = _fitted(patient, _loaded(atlas), reading)
-    record = fit_record(fitted)
-    if out is not None:
-        write_series(out, [fitted.individual], patient)
-    write_json(json_file, {"patient": intake.to_json(), **record})
+    record, people = fit_record(fitted), [fitted.individual]
     _tell_fit(fitted, record["alternatives"])
+    if out is not None:
+        write_series(out, people, series_records(people), patient)
+    write_json(json_file, {"patient": intake.to_json(), **record})
 
 
 def transfer(
@@ -181,8 +181,8 @@ def measure(
     with bar("measuring") as progress:
         norms = norms_of(loaded, progress=progress)
     record = measure_record(norms, values, None if fitted is None else fitted.individual)
-    write_json(json_file, record)
     _tell_measures(record, loaded.covariates, fitted)
+    write_json(json_file, record)
 
 
 def _require_own(out: Path | None, patient: Path) -> None:
@@ -268,16 +268,18 @@ def _row(covariates: Iterable[Covariate], values: Values) -> str:
 def _tell_series(
     fitted: Any, intake: Any, people: Sequence[Any], patient: Path, out: Path | None, json_file: Path | None
 ) -> None:
-    from naisr_model.patients.series import write_series
+    from naisr_model.patients.series import series_records, write_series
 
     with bar("measuring") as progress:
-        records = write_series(out, people, patient, progress=progress)
-    write_json(json_file, {"patient": intake.to_json(), "lasting": fitted.lasting, "shapes": records})
+        records = series_records(people, progress)
     for person, record in zip(people, records, strict=True):
         where = _row(person.atlas.covariates, person.covariates)
         low, high = record["volume_low_cm3"], record["volume_high_cm3"]
         print(f"{where}: {record['volume_cm3']:.1f} cm³ ({low:.1f} to {high:.1f})")
     print(f"at other covariates {100 * fitted.lasting:.0f} % of what sets the patient apart is kept")
+    if out is not None:
+        write_series(out, people, records, patient)
+    write_json(json_file, {"patient": intake.to_json(), "lasting": fitted.lasting, "shapes": records})
 
 
 def _tell_measures(record: Mapping[str, Any], covariates: Iterable[Covariate], fitted: Any) -> None:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 
 import pyvista as pv
 
 from naisr_model.atlas import Individual
 from naisr_model.errors import InputError
+from naisr_model.exports import mesh_bytes
 from naisr_model.files import replacing
 from naisr_model.progress import SILENT, Progress
 
@@ -18,6 +20,9 @@ TABLE, PICTURE = "volumes.csv", "shapes.png"
 
 PIXELS = 400
 """Sides of each shape's part of the picture."""
+
+Record = dict[str, float | str]
+"""What is known of a shape, by name with unit."""
 
 
 def require_own(out: Path, patient: Path | None) -> None:
@@ -39,47 +44,51 @@ def require_own(out: Path, patient: Path | None) -> None:
             raise InputError(f"{out} holds {there[0].name} of {whose}; give another folder")
 
 
-def write_series(
-    out: Path | None,
-    people: Sequence[Individual],
-    patient: Path | None = None,
-    *,
-    progress: Progress = SILENT,
-) -> list[dict[str, float | str]]:
-    """Measure each shape and, with ``out``, write it with a table and a picture into that folder.
-
-    What an earlier series of the same patient left there is removed first: the files belong together.
-
-    Args:
-        out: the folder.
-        people: the shapes.
-        patient: the file that they were made from.
-        progress: told the finished share.
+def series_records(people: Sequence[Individual], progress: Progress = SILENT) -> list[Record]:
+    """Measure each of the shapes.
 
     Returns:
         A record for each: covariates in real units, volume and its 95 % interval in cm³, mesh name.
 
     Raises:
-        InputError: when the folder holds something else, see :func:`require_own`, or cannot be written.
         Cancelled: when nobody waits any more.
     """
-    if out is not None:
-        require_own(out, patient)
-    records: list[dict[str, float | str]] = []
+    records: list[Record] = []
     for (number, person), _ in progress.over(list(enumerate(people, start=1))):
         low, high = person.volume_interval_cm3
         volumes = {"volume_cm3": person.volume_cm3, "volume_low_cm3": low, "volume_high_cm3": high}
         records.append({**person.covariates, **volumes, "mesh": f"shape{number:02d}.stl"})
-    if out is not None:
-        for old in _files(out):
-            if old.name != TABLE:  # which says whose the others are, until a new one does
-                old.unlink()
-        _write_table(out / TABLE, [{**record, "scan": _named(patient)} for record in records])
-        for record, person in zip(records, people, strict=True):
-            with replacing(out / str(record["mesh"])) as temporary, temporary.open("wb") as file:
-                person.surface.export(file, file_type="stl")
-        _write_picture(out / PICTURE, people)
     return records
+
+
+def write_series(
+    out: Path, people: Sequence[Individual], records: Sequence[Record], patient: Path | None = None
+) -> None:
+    """Write each shape, a table and a picture into a folder: all of it, or nothing.
+
+    What an earlier series of the same patient left there is removed then: the files belong together.
+
+    Args:
+        out: the folder.
+        people: the shapes.
+        records: of :func:`series_records`.
+        patient: the file that they were made from.
+
+    Raises:
+        InputError: when the folder holds something else, see :func:`require_own`, or cannot be written.
+    """
+    require_own(out, patient)
+    with ExitStack() as together:
+        for record, person in zip(records, people, strict=True):
+            file = together.enter_context(replacing(out / str(record["mesh"])))
+            file.write_bytes(mesh_bytes(person.surface, "stl"))
+        _write_picture(together.enter_context(replacing(out / PICTURE)), people)
+        table = together.enter_context(replacing(out / TABLE))
+        table.write_text(_table([{**each, "scan": _named(patient)} for each in records]), encoding="utf-8")
+    names = {PICTURE, TABLE, *(str(record["mesh"]) for record in records)}
+    for old in _files(out):
+        if old.name not in names:
+            old.unlink()
 
 
 def _files(out: Path) -> list[Path]:
@@ -106,7 +115,7 @@ def _title(person: Individual) -> str:
     return f"{', '.join(words)}\n{person.volume_cm3:.1f} cm³"
 
 
-def _write_table(path: Path, records: Sequence[dict[str, float | str]]) -> None:
+def _table(records: Sequence[Record]) -> str:
     text = io.StringIO()
     table = csv.DictWriter(text, list(records[0]), lineterminator="\n")
     table.writeheader()
@@ -115,8 +124,7 @@ def _write_table(path: Path, records: Sequence[dict[str, float | str]]) -> None:
         for record in records
     )
     table.writerows(rounded)
-    with replacing(path) as temporary:
-        temporary.write_text(text.getvalue(), encoding="utf-8")
+    return text.getvalue()
 
 
 def _write_picture(path: Path, people: Sequence[Individual]) -> None:
@@ -134,7 +142,6 @@ def _write_picture(path: Path, people: Sequence[Individual]) -> None:
     plotter.link_views()
     plotter.view_yz()
     try:
-        with replacing(path) as temporary:
-            plotter.screenshot(temporary)
+        plotter.screenshot(path)
     finally:
         plotter.close()

@@ -356,20 +356,13 @@ def test_a_second_run_on_the_same_store_is_told(cohort, tmp_path):
     assert told and not (tmp_path / "store" / ".lock").exists()
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="there is no limit for files")
 @pytest.mark.parametrize("workers", [1, 2])
-def test_a_store_that_finds_no_room_leaves_nothing_half_done_and_goes_on_later(cohort, tmp_path, workers):
-    """A limit for the size of files stands for a full disk; other processes get it from this one."""
-    import resource
-
+def test_a_store_that_finds_no_room_leaves_nothing_half_done_and_goes_on_later(
+    cohort, tmp_path, workers, no_room
+):
     out, options = tmp_path / "store", replace(SMALL, workers=workers)
-    hard = resource.getrlimit(resource.RLIMIT_FSIZE)[1]
-    resource.setrlimit(resource.RLIMIT_FSIZE, (4_000, hard))
-    try:
-        with pytest.raises(InputError, match=r"cannot write .*store.*: File too large; "):
-            prepare(cohort, out, options=options)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (hard, hard))
+    with no_room(4_000), pytest.raises(InputError, match=r"cannot write .*store.*: File too large; "):
+        prepare(cohort, out, options=options)
     assert [path.name for path in out.rglob("*") if path.is_file() or path.name.startswith(".")] == []
     prepare(cohort, out, options=options)
     prepare(cohort, tmp_path / "whole", options=options)

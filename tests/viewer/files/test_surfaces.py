@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -148,20 +147,14 @@ def test_an_effect_records_the_others_at_their_mean(engine, card):
     assert record["covariates"]["weight"]["value"] == 35.0
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="there is no limit for files")
 @pytest.mark.parametrize("ending", FORMATS)
-def test_a_surface_that_finds_no_room_is_a_sentence_and_leaves_nothing(result, card, tmp_path, ending):
-    """A limit for the size of files stands for a full disk."""
-    import resource
-
-    hard = resource.getrlimit(resource.RLIMIT_FSIZE)[1]
+def test_a_surface_that_finds_no_room_is_a_sentence_and_leaves_nothing(
+    result, card, tmp_path, ending, no_room
+):
     out = tmp_path / "out"
-    resource.setrlimit(resource.RLIMIT_FSIZE, (2_000, hard))
-    try:
-        with pytest.raises(InputError, match=rf"cannot write .*shape\.{ending}: File too large; "):
-            export.write_surface(out / f"shape.{ending}", result, card)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (hard, hard))
+    sentence = rf"cannot write .*shape\.{ending}: File too large; "
+    with no_room(2_000), pytest.raises(InputError, match=sentence):
+        export.write_surface(out / f"shape.{ending}", result, card)
     assert os.listdir(out) == []
 
 

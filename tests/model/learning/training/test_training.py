@@ -139,10 +139,7 @@ def test_a_second_training_of_the_same_atlas_is_told(egg_store, tmp_path):
     assert told and not (out.with_name("a.safetensors.training") / ".lock").exists()
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="there is no limit for files")
-def test_a_training_that_finds_no_room_keeps_what_it_saved_and_goes_on_later(egg_store, tmp_path):
-    """A limit for the size of files stands for a full disk."""
-    import resource
+def test_a_training_that_finds_no_room_keeps_what_it_saved_and_goes_on_later(egg_store, tmp_path, no_room):
 
     out, preset = tmp_path / "a.safetensors", egg_preset(epochs=4)
     whole = train(egg_store, preset, tmp_path / "whole.safetensors")
@@ -150,13 +147,8 @@ def test_a_training_that_finds_no_room_keeps_what_it_saved_and_goes_on_later(egg
     with pytest.raises(Cancelled):
         stop = Progress(is_unwanted=lambda: len(seen) == 3)
         train(egg_store, preset, out, report=seen.append, progress=stop)
-    hard = resource.getrlimit(resource.RLIMIT_FSIZE)[1]
-    resource.setrlimit(resource.RLIMIT_FSIZE, (4_000, hard))
-    try:
-        with pytest.raises(InputError, match=r"cannot write .*state\.pt: File too large; "):
-            train(egg_store, preset, out)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (hard, hard))
+    with no_room(4_000), pytest.raises(InputError, match=r"cannot write .*state\.pt: File too large; "):
+        train(egg_store, preset, out)
     assert load(out).training["iterations"] == 3
     left = [path.name for path in tmp_path.rglob(".*")]
     assert left == []
