@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from PySide6.QtCore import QByteArray, QSettings
@@ -17,7 +18,7 @@ THEME, RECENT, ASKS = "theme", "recent", "asks"
 
 
 class Preferences:
-    """Recent atlases, the theme, and which questions are asked.
+    """Recent atlases, the theme, and which questions are asked; what is damaged counts as never said.
 
     Args:
         settings: where they are kept.
@@ -29,7 +30,8 @@ class Preferences:
     @property
     def theme(self) -> ThemeChoice:
         """The theme chosen last; the system's before the first choice."""
-        return ThemeChoice(str(self._settings.value(THEME, ThemeChoice.SYSTEM.value)))
+        stored = self._settings.value(THEME)
+        return ThemeChoice(stored) if stored in set(ThemeChoice) else ThemeChoice.SYSTEM
 
     def set_theme(self, choice: ThemeChoice) -> None:
         """Have it again in the next run."""
@@ -50,8 +52,8 @@ class Preferences:
         """Files that were opened and still exist, the last one first."""
         stored = self._settings.value(RECENT, [])
         # A list of one comes back from the file as its only text.
-        names = [stored] if isinstance(stored, str) else list(stored or [])  # type: ignore[call-overload]
-        return [Path(name) for name in names if Path(name).is_file()]
+        names = stored if isinstance(stored, list) else [stored]
+        return [Path(name) for name in names if isinstance(name, str) and os.path.isfile(name)]
 
     def remember(self, path: Path) -> None:
         """Put a file in front of the recent ones."""
