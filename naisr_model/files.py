@@ -11,8 +11,8 @@ import os
 import secrets
 import shutil
 import stat
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from naisr_model.errors import InputError
@@ -51,6 +51,20 @@ def replacing(path: Path) -> Iterator[Path]:
             os.replace(temporary, target)
         finally:
             temporary.unlink(missing_ok=True)
+
+
+def write_all(files: Iterable[tuple[Path, bytes]]) -> None:
+    """Write files that belong together: all take their places in the end, or none does.
+
+    Args:
+        files: places and contents, asked for one after the other: only one content need be in memory.
+
+    Raises:
+        InputError: when one of them cannot be written.
+    """
+    with ExitStack() as together:
+        for path, content in files:
+            together.enter_context(replacing(path)).write_bytes(content)
 
 
 @contextmanager

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Sequence
-from contextlib import ExitStack
+from itertools import chain
 from pathlib import Path
 
 import pyvista as pv
@@ -13,7 +13,7 @@ import pyvista as pv
 from naisr_model.atlas import Individual
 from naisr_model.errors import InputError
 from naisr_model.exports import mesh_bytes
-from naisr_model.files import replacing
+from naisr_model.files import write_all
 from naisr_model.progress import SILENT, Progress
 
 TABLE, PICTURE = "volumes.csv", "shapes.png"
@@ -78,17 +78,12 @@ def write_series(
         InputError: when the folder holds something else, see :func:`require_own`, or cannot be written.
     """
     require_own(out, patient)
-    with ExitStack() as together:
-        for record, person in zip(records, people, strict=True):
-            file = together.enter_context(replacing(out / str(record["mesh"])))
-            file.write_bytes(mesh_bytes(person.surface, "stl"))
-        _write_picture(together.enter_context(replacing(out / PICTURE)), people)
-        table = together.enter_context(replacing(out / TABLE))
-        table.write_text(_table([{**each, "scan": _named(patient)} for each in records]), encoding="utf-8")
-    names = {PICTURE, TABLE, *(str(record["mesh"]) for record in records)}
-    for old in _files(out):
-        if old.name not in names:
-            old.unlink()
+    meshes = [out / str(record["mesh"]) for record in records]
+    owned = [{**each, "scan": _named(patient)} for each in records]
+    surfaces = zip(meshes, (mesh_bytes(person.surface, "stl") for person in people), strict=True)
+    write_all(chain(surfaces, [(out / PICTURE, _picture(people)), (out / TABLE, _table(owned).encode())]))
+    for old in set(_files(out)) - {*meshes, out / PICTURE, out / TABLE}:
+        old.unlink()
 
 
 def _files(out: Path) -> list[Path]:
@@ -127,8 +122,9 @@ def _table(records: Sequence[Record]) -> str:
     return text.getvalue()
 
 
-def _write_picture(path: Path, people: Sequence[Individual]) -> None:
-    """The shapes side by side, at one scale and seen from one side."""
+def _picture(people: Sequence[Individual]) -> bytes:
+    """The shapes side by side, at one scale and seen from one side, as PNG."""
+    picture = io.BytesIO()
     with pv.vtk_verbosity("error"):  # without a display VTK warns of it, then draws all the same
         plotter = pv.Plotter(
             off_screen=True, shape=(1, len(people)), window_size=(PIXELS * len(people), PIXELS)
@@ -142,6 +138,7 @@ def _write_picture(path: Path, people: Sequence[Individual]) -> None:
     plotter.link_views()
     plotter.view_yz()
     try:
-        plotter.screenshot(path)
+        plotter.screenshot(picture)
     finally:
         plotter.close()
+    return picture.getvalue()

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 from threading import Event
 
+from naisr_model.files import write_all
 from naisr_model.progress import Progress
 from naisr_viewer.control.worker import Deliver, Job
 from naisr_viewer.engine.atlases import Read
@@ -19,7 +21,7 @@ from naisr_viewer.files.exports import Planned
 from naisr_viewer.files.figure import figure_bytes
 from naisr_viewer.files.matrix import MatrixPlan, figure_of, write_matrix
 from naisr_viewer.files.sessions import write_session
-from naisr_viewer.files.surfaces import require_writable, write_surface
+from naisr_viewer.files.surfaces import surface_files
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.curves import CurveRequest, Curves, Standing
 from naisr_viewer.state.explorer import ExplorerState
@@ -87,10 +89,9 @@ def exporting(
 
     def job(deliver: Deliver[ExportReport], progress: Progress) -> None:
         surfaces = [engine.surface(each.request, piece) for each, piece in progress.over(plan)]
-        for each, surface in zip(plan, surfaces, strict=True):
-            require_writable(each.path, surface)
-        for each, surface in zip(plan, surfaces, strict=True):
-            write_surface(each.path, surface, atlas, each.owner, each.reference)
+        pairs = zip(plan, surfaces, strict=True)
+        files = (surface_files(each.path, found, atlas, each.owner, each.reference) for each, found in pairs)
+        write_all(chain.from_iterable(files))
         deliver(ExportReport(len(plan), choice))
 
     return job

@@ -11,7 +11,7 @@ from typing import Any
 
 from naisr_model.covariates import Covariate
 from naisr_model.errors import InputError
-from naisr_model.files import replacing
+from naisr_model.files import write_all
 from naisr_viewer import __version__
 from naisr_viewer.files.surfaces import patient_record, record_of
 from naisr_viewer.state.curves import DISTANCE, Curves, MeasureCurve, Numbers
@@ -51,9 +51,7 @@ def write_curve(path: Path, curves: Curves, state: ExplorerState, draw: Callable
     is_table = path.suffix.lower() == TABLE
     content = table(curves, curve, covariate).encode() if is_table else draw()
     record = json.dumps(description(path, curves, state), indent=2, ensure_ascii=False) + "\n"
-    for file, data in ((path, content), (record_of(path), record.encode())):
-        with replacing(file) as temporary:
-            temporary.write_bytes(data)
+    write_all([(path, content), (record_of(path), record.encode())])
 
 
 def in_the_way(path: Path) -> list[Path]:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from naisr_model.files import replacing
+from naisr_model.files import write_all
 from naisr_viewer.files.exports import Planned, matrix_stem, planned
 from naisr_viewer.files.figure import MatrixFigure, Plate
-from naisr_viewer.files.surfaces import description, write_mesh
+from naisr_viewer.files.surfaces import description, surface_bytes
 from naisr_viewer.panels.kinds import caption_of, title_of
 from naisr_viewer.panels.matrix import is_pale
 from naisr_viewer.state.explorer import ExplorerState
@@ -72,22 +73,17 @@ def figure_of(
 def write_matrix(
     plan: MatrixPlan, state: ExplorerState, surfaces: Sequence[SurfaceResult], figure: bytes
 ) -> None:
-    """Write all files of a plan, whose surfaces are in its order; a cell without a surface has no mesh.
+    """Write all files of a plan, or none; surfaces are in its order, and a cell without one has no mesh.
 
     Raises:
         InputError: when one of them cannot be written.
     """
     assert state.atlas is not None
-    meshes = [
-        (each.path, surface) for each, surface in zip(plan.cells, surfaces, strict=True) if has(surface)
-    ]
-    for path, surface in meshes:
-        write_mesh(path, surface, state.atlas)
-    with replacing(plan.figure) as temporary:
-        temporary.write_bytes(figure)
+    cells = zip(plan.cells, surfaces, strict=True)
+    there = [(each.path, surface) for each, surface in cells if has(surface)]
+    meshes = ((path, surface_bytes(path, surface, state.atlas)) for path, surface in there)
     text = json.dumps(record(plan, state, surfaces), indent=2, ensure_ascii=False) + "\n"
-    with replacing(plan.record) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_all(chain(meshes, [(plan.figure, figure), (plan.record, text.encode())]))
 
 
 def record(plan: MatrixPlan, state: ExplorerState, surfaces: Sequence[SurfaceResult]) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, cast
@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 from naisr_model.covariates import Covariate
 from naisr_model.errors import InputError
 from naisr_model.exports import FORMATS, MeshFormat, format_named, mesh_bytes
-from naisr_model.files import replacing
 from naisr_viewer import __version__
 from naisr_viewer.panels.base import Numbers
 from naisr_viewer.panels.kinds import kind_of, title_of
@@ -31,14 +30,14 @@ POINT_FORMATS = ("ply", "vtp")
 """Formats that hold a cloud of points, and numbers at the points."""
 
 
-def write_surface(
+def surface_files(
     path: Path,
     result: SurfaceResult,
     atlas: AtlasCard,
     patient: OpenScan | None = None,
     reference: OpenScan | None = None,
-) -> tuple[Path, Path]:
-    """Write a surface and, beside it, a JSON record of what it shows.
+) -> Iterator[tuple[Path, bytes]]:
+    """A surface and, beside it, a JSON record of what it shows, each with its place.
 
     Args:
         path: the mesh file; its ending is one of :data:`~naisr_model.exports.FORMATS`.
@@ -47,31 +46,22 @@ def write_surface(
         patient: whose it is; None for the population average.
         reference: the patient that a change is counted from.
 
-    Returns:
-        The mesh file and the record.
-
     Raises:
-        InputError: when there is no surface to write, or the ending or folder will not do.
+        InputError: when there is no surface to write, or the ending will not do.
     """
-    beside = record_of(path)
-    write_mesh(path, result, atlas)
+    yield path, surface_bytes(path, result, atlas)
     record = description(result, atlas, path.name, patient, reference)
-    text = json.dumps(record, indent=2, ensure_ascii=False) + "\n"
-    with replacing(beside) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-    return path, beside
+    yield record_of(path), (json.dumps(record, indent=2, ensure_ascii=False) + "\n").encode()
 
 
-def write_mesh(path: Path, result: SurfaceResult, atlas: AtlasCard) -> None:
-    """Write a surface alone; otherwise as :func:`write_surface`."""
-    ending = require_writable(path, result)
-    content = mesh_bytes(_triangles(result, _at_vertices(result, atlas)), ending)
-    with replacing(path) as temporary:
-        temporary.write_bytes(content)
+def surface_bytes(path: Path, result: SurfaceResult, atlas: AtlasCard) -> bytes:
+    """A surface alone; otherwise as :func:`surface_files`."""
+    ending = _writable(path, result)
+    return mesh_bytes(_triangles(result, _at_vertices(result, atlas)), ending)
 
 
-def require_writable(path: Path, result: SurfaceResult) -> MeshFormat:
-    """Make sure that a surface can be written to a file of this ending, and say in which format.
+def _writable(path: Path, result: SurfaceResult) -> MeshFormat:
+    """The format in which a surface can be written to a file of this ending.
 
     Raises:
         InputError: when it cannot.

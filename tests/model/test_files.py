@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import errno
 import os
 import subprocess
@@ -19,6 +20,7 @@ from naisr_model.files import (
     replacing,
     replacing_folder,
     sources_digest,
+    write_all,
 )
 
 ROOT = Path(__file__).parents[2]
@@ -241,6 +243,24 @@ def test_what_a_killed_run_left_goes_with_a_later_one(tmp_path):
     assert sorted(os.listdir(tmp_path)) == [".shape.mine.stl", "shape.stl"]
 
 
+def test_files_that_belong_together_are_replaced_together(tmp_path, no_room):
+    small, large = tmp_path / "a.txt", tmp_path / "new" / "b.txt"
+    write_all([(small, b"1"), (large, b"2")])
+    sentence = r"cannot write \S*b\.txt: File too large; "
+    with no_room(100), pytest.raises(InputError, match=sentence):
+        write_all([(small, b"3"), (large, bytes(1000))])
+    with pytest.raises(InputError, match="no surface"):
+        write_all((path, content_or_refusal(path)) for path in (small, large))
+    assert (small.read_bytes(), large.read_bytes()) == (b"1", b"2")
+    assert sorted(os.listdir(tmp_path)) == ["a.txt", "new"] and os.listdir(large.parent) == ["b.txt"]
+
+
+def content_or_refusal(path: Path) -> bytes:
+    if path.name == "b.txt":
+        raise InputError("there is no surface")
+    return b"5"
+
+
 def test_a_folder_is_replaced_whole_or_not_at_all(tmp_path):
     path = tmp_path / "samples"
     with replacing_folder(path) as temporary:
@@ -270,3 +290,31 @@ def test_sources_are_known_by_what_they_say_and_not_by_where_they_are(tmp_path):
     assert first != sources_digest(program("b", one="x = 1", two="y = 3"))
     assert first != sources_digest(program("c", one="x = 1"))
     assert first != sources_digest(program("a"), program("b"))
+
+
+SAFELY = {"replacing", "replacing_folder", "write_all", "telling"}
+
+
+def writes(node: ast.AST) -> bool:
+    """Whether a call puts something into a file."""
+    if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Attribute):
+        return False
+    if node.func.attr in ("write_text", "write_bytes"):
+        return True
+    modes = [each.value for each in node.args if isinstance(each, ast.Constant)]
+    return node.func.attr == "open" and any(set("wax+") & set(str(mode)) for mode in modes)
+
+
+def test_whoever_writes_a_file_does_it_safely():
+    found = {}
+    for package in ("naisr_model", "naisr_viewer"):
+        for path in (ROOT / package).rglob("*.py"):
+            nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+            imports = [each for each in nodes if isinstance(each, ast.ImportFrom)]
+            known = {
+                name.name for each in imports if each.module == "naisr_model.files" for name in each.names
+            }
+            if any(map(writes, nodes)) and path.name != "files.py":
+                found[path.relative_to(ROOT).as_posix()] = bool(known & SAFELY)
+    assert len(found) > 10
+    assert [path for path, is_safe in found.items() if not is_safe] == []

@@ -15,7 +15,9 @@ import trimesh
 from naisr_model import __version__
 from naisr_model.errors import InputError
 from naisr_model.exports import FORMATS
+from naisr_model.files import write_all
 from naisr_viewer.files import surfaces as export
+from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.layouts import FULL_SHAPE, Panel
 from naisr_viewer.state.overlay import Map, Quantity
 from naisr_viewer.state.requests import Colouring, Origin, SurfaceRequest, SurfaceResult
@@ -26,6 +28,11 @@ VALUES = {"age": 150.0, "weight": 50.0, "sex": 1.0}
 @pytest.fixture
 def result(engine, card) -> SurfaceResult:
     return engine.surface(SurfaceRequest(card.path, FULL_SHAPE, tuple(VALUES.items()), 128))
+
+
+def written(path: Path, result: SurfaceResult, card: AtlasCard) -> tuple[Path, Path]:
+    write_all(export.surface_files(path, result, card))
+    return path, export.record_of(path)
 
 
 def read(path: Path) -> trimesh.Trimesh:
@@ -41,7 +48,7 @@ def read(path: Path) -> trimesh.Trimesh:
 
 @pytest.mark.parametrize("ending", FORMATS)
 def test_every_format_holds_the_true_shape_in_its_unit(result, card, atlas, tmp_path, ending):
-    path, _ = export.write_surface(tmp_path / f"shape.{ending}", result, card)
+    path, _ = written(tmp_path / f"shape.{ending}", result, card)
     mesh = read(path)
     assert mesh.volume / 1000 == pytest.approx(atlas.volume_cm3(**VALUES), rel=0.01)
     assert mesh.volume == pytest.approx(trimesh.Trimesh(result.points_mm, result.faces).volume, rel=1e-4)
@@ -52,7 +59,7 @@ def test_every_format_holds_the_true_shape_in_its_unit(result, card, atlas, tmp_
 
 
 def test_the_record_says_what_the_file_shows(result, card, tmp_path):
-    _, beside = export.write_surface(tmp_path / "shape.stl", result, card)
+    _, beside = written(tmp_path / "shape.stl", result, card)
     record = json.loads(beside.read_text(encoding="utf-8"))
     assert beside.name == "shape.stl.json"
     own_cm3 = trimesh.load_mesh(tmp_path / "shape.stl").volume / 1000
@@ -84,7 +91,7 @@ def test_numbers_on_a_surface_are_in_the_file_or_the_record_says_that_they_are_n
     result, card, tmp_path, ending
 ):
     change = coloured(result)
-    path, beside = export.write_surface(tmp_path / f"change.{ending}", change, card)
+    path, beside = written(tmp_path / f"change.{ending}", change, card)
     numbers = json.loads(beside.read_text(encoding="utf-8"))["numbers"]
     assert (numbers["name"], numbers["unit"]) == ("change_mm", "mm")
     assert numbers["in_file"] == (ending in ("ply", "vtp"))
@@ -109,7 +116,7 @@ MAPS = {
 def test_numbers_of_a_map_are_called_what_they_are(result, card, tmp_path, shown):
     request = replace(result.request, map=shown)
     mapped = replace(result, request=request, colouring=Colouring(changes(result), 3.0, "signed"))
-    path, beside = export.write_surface(tmp_path / "map.vtp", mapped, card)
+    path, beside = written(tmp_path / "map.vtp", mapped, card)
     numbers = json.loads(beside.read_text(encoding="utf-8"))["numbers"]
     name, unit = MAPS[shown]
     assert (numbers["name"], numbers["unit"], numbers["in_file"]) == (name, unit, True)
@@ -131,10 +138,10 @@ def test_a_cloud_of_points_goes_where_points_can_be(result, card, tmp_path, endi
     path = tmp_path / f"scan.{ending}"
     if ending not in ("ply", "vtp"):
         with pytest.raises(InputError, match="export it as ply or vtp"):
-            export.write_surface(path, cloud, card)
+            written(path, cloud, card)
         assert not path.exists()
         return
-    _, beside = export.write_surface(path, cloud, card)
+    _, beside = written(path, cloud, card)
     np.testing.assert_allclose(pv.read(path).points, result.points_mm, rtol=1e-5)
     record = json.loads(beside.read_text(encoding="utf-8"))
     assert record["volume_cm3"] is None and record["volume_of_triangles_cm3"] is None
@@ -154,15 +161,15 @@ def test_a_surface_that_finds_no_room_is_a_sentence_and_leaves_nothing(
     out = tmp_path / "out"
     sentence = rf"cannot write .*shape\.{ending}: File too large; "
     with no_room(2_000), pytest.raises(InputError, match=sentence):
-        export.write_surface(out / f"shape.{ending}", result, card)
+        written(out / f"shape.{ending}", result, card)
     assert os.listdir(out) == []
 
 
 def test_nothing_and_nonsense_are_refused_in_words(result, card, atlas, engine, tmp_path, monkeypatch):
     with pytest.raises(InputError, match="must be one of stl, ply"):
-        export.write_surface(tmp_path / "shape.docx", result, card)
+        written(tmp_path / "shape.docx", result, card)
     monkeypatch.setattr(atlas, "_surface", lambda *_: trimesh.Trimesh())
     empty = engine.surface(SurfaceRequest(card.path, FULL_SHAPE, (), 64))
     with pytest.raises(InputError, match="no surface"):
-        export.write_surface(tmp_path / "shape.stl", empty, card)
+        written(tmp_path / "shape.stl", empty, card)
     assert os.listdir(tmp_path) == ["ellipsoid.safetensors"]
