@@ -2,28 +2,20 @@
 
 from __future__ import annotations
 
-import hashlib
-import re
 from collections.abc import Sequence
 from itertools import count
 from pathlib import Path
 from typing import NamedTuple
 
-from naisr_model.covariates import Covariate
 from naisr_viewer.files.surfaces import record_of
 from naisr_viewer.panels.kinds import kind_of, request_for, title_of
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Panel
 from naisr_viewer.state.matrix import plain_panel
-from naisr_viewer.state.patients import Named, OpenScan
+from naisr_viewer.state.patients import OpenScan
 from naisr_viewer.state.requests import EXACT_RESOLUTION, ExportChoice, SurfaceRequest
-
-STRANGE = re.compile(r"[^\w.+-]+")
-"""What a file system, a shell or a web address may take for something else."""
-
-LONGEST_STEM = 180
-"""Bytes of a name without its ending; file systems take 255 with it."""
+from naisr_viewer.words.names import in_names, plain_names, stem_of, what_of
 
 
 class Planned(NamedTuple):
@@ -73,12 +65,11 @@ def file_stem(
     where that is somebody else.
     """
     view = plain_panel(request.values) if request.panel.cell else request.panel
-    words = "-".join([atlas.name, *_plain_names(owner), title_of(view)]).lower()
-    parts = [words, *_values(atlas, request.values)]
+    parts = [what_of(atlas, *plain_names(owner), what=title_of(view)), *in_names(atlas, request.values)]
     if request.before is not None:
         parts += ["-".join(["since", *_since(request.before[0], owner, reference)])]
-        parts += _values(atlas, request.before[1])
-    return _short("_".join(STRANGE.sub("-", part).strip("-") for part in parts))
+        parts += in_names(atlas, request.before[1])
+    return stem_of(*parts)
 
 
 def matrix_stem(state: ExplorerState) -> str:
@@ -86,16 +77,15 @@ def matrix_stem(state: ExplorerState) -> str:
     assert state.atlas is not None
     assert state.matrix is not None
     owner = state.shown if state.fit else None
-    words = "-".join([state.atlas.name, *_plain_names(owner), "matrix"]).lower()
-    parts = [words, state.matrix.across.covariate, state.matrix.down.covariate]
-    return _short("_".join(STRANGE.sub("-", part).strip("-") for part in parts))
+    first = what_of(state.atlas, *plain_names(owner), what="matrix")
+    return stem_of(first, state.matrix.across.covariate, state.matrix.down.covariate)
 
 
 def _since(person: int, owner: OpenScan | None, reference: OpenScan | None) -> list[str]:
     """Whom a change is counted from, where that is not its owner."""
     if not person:
         return ["average"]
-    return _plain_names(reference if reference is not owner else None)
+    return plain_names(reference if reference is not owner else None)
 
 
 def _resolution(panel: Panel, choice: ExportChoice) -> int:
@@ -115,31 +105,3 @@ def _apart(path: Path, plan: Sequence[Planned]) -> Path:
     return (
         path if path.name.lower() not in taken else next(p for p in numbered if p.name.lower() not in taken)
     )
-
-
-def _short(stem: str) -> str:
-    """``stem``, where it is too long for a file system cut and marked so that two of them stay apart."""
-    if len(stem.encode()) <= LONGEST_STEM:
-        return stem
-    mark = hashlib.sha256(stem.encode()).hexdigest()[:8]
-    return f"{stem.encode()[:LONGEST_STEM].decode(errors='ignore')}-{mark}"
-
-
-def _values(atlas: AtlasCard, values: Named) -> list[str]:
-    known = {covariate.name: covariate for covariate in atlas.covariates}
-    return [_value(known[name], value) for name, value in values]
-
-
-def _value(covariate: Covariate, value: float) -> str:
-    """``age120``, ``weight34.5``, ``sexM``; of a level in between its number."""
-    told = covariate.format(value) if covariate.kind == "binary" and abs(value) == 1 else f"{value:.4g}"
-    return f"{covariate.name}{told}"
-
-
-def _plain_names(owner: OpenScan | None) -> list[str]:
-    """The name without the file's ending and without parentheses: ``p01.stl (2)`` is ``p01 2``."""
-    if owner is None:
-        return []
-    file = owner.reading.path.name
-    stem = file.removesuffix(".gz").rpartition(".")[0] or file
-    return [owner.name.replace(file, stem).replace("(", "").replace(")", "")]

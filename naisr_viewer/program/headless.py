@@ -12,13 +12,14 @@ from PySide6.QtTest import QTest
 
 from naisr_model.errors import InputError
 from naisr_viewer.control.controller import Controller
-from naisr_viewer.files.exports import STRANGE, planned
+from naisr_viewer.files.exports import planned
 from naisr_viewer.panels.kinds import layouts_of, panels_in
 from naisr_viewer.state.layouts import FULL_SHAPE, Layout
 from naisr_viewer.state.requests import EXACT_RESOLUTION, ExportChoice
 from naisr_viewer.views.covariates.row import CovariateRow
 from naisr_viewer.views.covariates.slider import SLIDER_STEPS
 from naisr_viewer.views.main_window import MainWindow
+from naisr_viewer.words.names import STRANGE
 
 DEADLINE_S = 600.0
 """Nothing on screen takes longer than this, even on a slow machine."""

@@ -8,6 +8,7 @@ from PySide6.QtCore import QMimeData
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from naisr_viewer.state.explorer import ExplorerState
+from naisr_viewer.words.names import seen_stem
 
 ATLAS_ENDING = ".safetensors"
 ATLAS_FILTER = f"Atlas (*{ATLAS_ENDING});;All files (*)"
@@ -44,8 +45,7 @@ def ask_session_path(parent: QWidget) -> Path | None:
 
 def ask_session_place(parent: QWidget, state: ExplorerState) -> Path | None:
     """Where a session goes, or None; whether a file may be replaced is asked of the whole name."""
-    whom = f"-{Path(state.shown.name).stem}" if state.shown else ""
-    proposal = f"{state.atlas.name if state.atlas else 'atlas'}{whom}-session{SESSION_ENDING}"
+    proposal = f"{seen_stem(state, 'session')}{SESSION_ENDING}"
     unasked = QFileDialog.Option.DontConfirmOverwrite
     name, _ = QFileDialog.getSaveFileName(parent, "Save the session", proposal, SESSION_FILTER, "", unasked)
     path = Path(name)
@@ -56,8 +56,7 @@ def ask_session_place(parent: QWidget, state: ExplorerState) -> Path | None:
 
 def ask_curve_place(parent: QWidget, state: ExplorerState, ending: str) -> Path | None:
     """Where a curve goes, or None; whether a file may be replaced is asked of the whole name."""
-    whom = f"-{Path(state.shown.name).stem}" if state.shown else ""
-    proposal = f"{state.atlas.name if state.atlas else 'atlas'}{whom}-{state.curve.measure}{ending}"
+    proposal = f"{seen_stem(state, state.curve.measure)}{ending}"
     unasked = QFileDialog.Option.DontConfirmOverwrite
     kind = f"{ending[1:].upper()} (*{ending})"
     name, _ = QFileDialog.getSaveFileName(parent, "Save the curve", proposal, kind, "", unasked)
@@ -76,7 +75,7 @@ def ask_landmarks_path(parent: QWidget) -> Path | None:
 
 def ask_image_path(parent: QWidget, state: ExplorerState) -> Path | None:
     """Where a picture goes, or None; whether a file may be replaced is asked of the whole name."""
-    proposal = f"{state.atlas.name if state.atlas else 'atlas'}{PICTURE_ENDING}"
+    proposal = f"{seen_stem(state, has_values=True)}{PICTURE_ENDING}"
     unasked = QFileDialog.Option.DontConfirmOverwrite
     name, _ = QFileDialog.getSaveFileName(parent, "Save a picture", proposal, "PNG (*.png)", "", unasked)
     return as_picture(Path(name)) if name else None

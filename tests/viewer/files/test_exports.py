@@ -8,9 +8,10 @@ import pytest
 
 from naisr_viewer.files.exports import file_stem, in_the_way, planned
 from naisr_viewer.panels.kinds import panels_in
-from naisr_viewer.state.explorer import ExplorerState, opened, with_value
+from naisr_viewer.state.explorer import ExplorerState, opened, with_value, with_values
 from naisr_viewer.state.layouts import FULL_SHAPE, TEMPLATE, Layout, Panel
 from naisr_viewer.state.requests import ExportChoice, SurfaceRequest
+from naisr_viewer.words.names import seen_stem
 
 VALUES = (("age", 150.0), ("weight", 34.5), ("sex", 1.0))
 
@@ -81,3 +82,11 @@ def test_meshes_and_records_that_are_there_are_in_the_way(state, tmp_path):
     (tmp_path / "ellipsoid-template.stl.json").write_text("{}")
     (tmp_path / "another.stl").write_text("")
     assert [file.name for file in in_the_way(plan)] == ["ellipsoid-template.stl.json"]
+
+
+def test_a_picture_is_named_after_what_is_seen(card):
+    state = with_values(opened(ExplorerState(), card), (("age", 120.0), ("sex", 1.0)))
+    weight = dict(state.named)["weight"]
+    assert seen_stem(state, has_values=True) == f"ellipsoid_age120_weight{weight:.4g}_sexM"
+    assert seen_stem(state, "session") == "ellipsoid-session"
+    assert seen_stem(ExplorerState()) == "atlas"
