@@ -5,20 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QGuiApplication, QImage, QPaintEvent
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QMainWindow, QWidget
 
 from naisr_model.shipped import shipped
-from naisr_viewer.panels.kinds import visible_panels
+from naisr_viewer.panels.kinds import title_of, visible_panels
 from naisr_viewer.panels.maps import can_map, words_of_maps
 from naisr_viewer.panels.matrix import here
 from naisr_viewer.panels.scales import scale_of
 from naisr_viewer.state.curves import Curves, Reckoning, Standing
 from naisr_viewer.state.drawer import Tab, tabs_of
 from naisr_viewer.state.explorer import ExplorerState
-from naisr_viewer.state.layouts import Layout
+from naisr_viewer.state.layouts import Layout, Panel
 from naisr_viewer.state.patients import Labels
 from naisr_viewer.state.pins import Ledger
 from naisr_viewer.state.questions import Answer, Question
@@ -64,6 +65,10 @@ from naisr_viewer.views.status_bar import StatusBar
 from naisr_viewer.views.style_sheet import style_sheet
 from naisr_viewer.views.theme import palette, resolved
 from naisr_viewer.words.matrix import heads
+from naisr_viewer.words.readout import number, readout
+
+if TYPE_CHECKING:
+    from naisr_viewer.views.shapes.sub_plot import Hit
 
 TITLE = "NAISR Atlas Explorer"
 FIRST_SIZE = QSize(1280, 800)
@@ -432,6 +437,8 @@ class MainWindow(QMainWindow):
         self.patients.open_requested.connect(self.ask_scan)
         self.cancel.clicked.connect(self.cancel_requested)
         self.shapes.scale_changed.connect(self.scale.set_scale)
+        self.shapes.hovered.connect(self._show_readout)
+        self.shapes.left.connect(lambda: self._below.show_readout(""))
         # Queued, so that the picture has reached the screen before charts are made.
         self.shapes.drawn.connect(self._prepare_charts, Qt.ConnectionType.QueuedConnection)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._system_theme_changed)
@@ -443,6 +450,14 @@ class MainWindow(QMainWindow):
         curve.value_settled.connect(self.covariates.value_settled)
         curve.save_requested.connect(self._ask_curve_place)
         curve.reckoning_requested.connect(self.reckoning_requested)
+
+    def _show_readout(self, panel: Panel, hit: Hit) -> None:
+        """What the mouse rests over."""
+        scale = scale_of(self._state, panel)
+        told = ""
+        if hit.value is not None and scale is not None:
+            told = number(hit.value, scale.unit, scale.scale == "signed")
+        self._below.show_readout(readout(title_of(panel), hit.point_mm, told))
 
     def _prepare_charts(self) -> None:
         """Once, after the first picture."""

@@ -30,10 +30,20 @@ class StatusBar(QStatusBar):
         self.cancel.setToolTip("Stop the computation and keep what is on screen (Esc)")
         self.cancel.setShortcut(QKeySequence(Qt.Key.Key_Escape))
         self.scale = ScaleBar(self)
+        self.readout = ElidedLabel("", self)
+        self.readout.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.readout.keep_free(0, 12)
         self.addWidget(self.text, 1)
+        self.addWidget(self.readout, 1)
         for widget in (self.progress, self.cancel, self.scale):
             self.addPermanentWidget(widget)
         self.show_progress(None)
+        self.show_readout("")
+
+    def show_readout(self, text: str) -> None:
+        """What is under the mouse; nothing leaves the room to the line of text."""
+        self.readout.setText(text)
+        self.readout.setVisible(bool(text))
 
     def show_progress(self, fraction: float | None) -> None:
         """The bar and its cancel button; None hides them, at 0 it only says: busy."""

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
-from PySide6.QtCore import QPoint, QPointF, Qt, Signal
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt, QTimer, Signal
 from PySide6.QtGui import QMouseEvent
 from PySide6.QtWidgets import QWidget
 from pyvistaqt import QtInteractor
@@ -21,6 +21,9 @@ from naisr_viewer.views.shapes.sub_plot import SubPlot, picked, set_colouring, s
 
 REST_SAMPLES = 4
 """Multi-sampling at rest; none while something moves, where it costs two thirds of a frame."""
+
+HOVER_MS = 80
+"""So long a mouse rests before it is looked what is under it: never while it is on its way."""
 
 CLICK_PX = 4
 """A mouse that has gone so far between press and release has turned the shapes."""
@@ -40,17 +43,22 @@ class Canvas(QtInteractor):
     clicked = Signal(int, object)  # a short click: which sub-plot, and the point (mm) of its surface there
     chosen = Signal(int)  # a short click on a sub-plot, beside its surface too
     opened = Signal(int)  # a double click on a sub-plot, after that
+    hovered = Signal(int, object)  # the mouse rests: over which sub-plot, and the Hit there or None
+    left = Signal()  # what was told of the mouse holds no more
 
     def __init__(self, colours: Sequence[str], parent: QWidget) -> None:
         self._plots: list[SubPlot] = []
         self._ghost_colour, self._ground = "#000000", "#ffffff"
         self._is_moving = self._is_held = False
         self._pressed: QPoint | None = None
+        self._place = QPointF()
         super().__init__(
             parent, shape=(1, len(colours)), border=False, auto_update=False, multi_samples=REST_SAMPLES
         )
         self.setAcceptDrops(False)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._rest = QTimer(self, singleShot=True, interval=HOVER_MS)
+        self._rest.timeout.connect(self._look_under_mouse)
         self._requests = self.iren.interactor.AddObserver("RenderEvent", self._render_requested)
         self.iren.interactor.EnableRenderOff()
         self._plots = [self._sub_plot(index, colour) for index, colour in enumerate(colours)]
@@ -68,12 +76,14 @@ class Canvas(QtInteractor):
             set_points(plot, old, result)
         set_colouring(plot, result.colouring)
         plot.is_stale = True
+        self._forget_hover()
         self.update()
 
     def clear_surface(self, index: int) -> None:
         """Show nothing until the next surface comes."""
         plot = self._plots[index]
         plot.result = None
+        self._forget_hover()
         plot.mesh.copy_from(pv.PolyData(), deep=False)
         plot.is_stale = True
         self.update()
@@ -208,6 +218,19 @@ class Canvas(QtInteractor):
         self._pressed = event.position().toPoint() if event.button() is Qt.MouseButton.LeftButton else None
         self._set_held(True)
 
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Turn the shapes, or come to rest over one."""
+        super().mouseMoveEvent(event)
+        self._forget_hover()
+        if event.buttons() == Qt.MouseButton.NoButton and not self._is_moving:
+            self._place = event.position()
+            self._rest.start()
+
+    def leaveEvent(self, event: QEvent) -> None:
+        """Nothing is under the mouse any more."""
+        super().leaveEvent(event)
+        self._forget_hover()
+
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         """Draw smoothly again when the mouse lets go of the shapes."""
         super().mouseReleaseEvent(event)
@@ -234,10 +257,18 @@ class Canvas(QtInteractor):
     def _pick(self, place: QPointF) -> None:
         """Tell what was clicked."""
         for index, plot in self._plots_at(place):
-            point_mm = picked(plot, *self._from_below(place))
-            if point_mm is not None:
-                self.clicked.emit(index, point_mm)
+            hit = picked(plot, *self._from_below(place))
+            if hit is not None:
+                self.clicked.emit(index, hit.point_mm)
             self.chosen.emit(index)
+
+    def _look_under_mouse(self) -> None:
+        for index, plot in self._plots_at(self._place):
+            self.hovered.emit(index, picked(plot, *self._from_below(self._place)))
+
+    def _forget_hover(self) -> None:
+        self._rest.stop()
+        self.left.emit()
 
     def _plots_at(self, place: QPointF) -> list[tuple[int, SubPlot]]:
         """The sub-plot there, with its number, if any."""

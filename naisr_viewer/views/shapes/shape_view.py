@@ -40,6 +40,7 @@ from naisr_viewer.words.matrix import Heads
 
 if TYPE_CHECKING:
     from naisr_viewer.views.shapes.canvas import Canvas
+    from naisr_viewer.views.shapes.sub_plot import Hit
 
 NO_FACES = np.zeros((0, 3), np.int64)
 
@@ -65,6 +66,8 @@ class ShapeView(QWidget):
     clicked = Signal(object, object)  # a short click on a surface: its Panel, and the point there (mm)
     chosen = Signal(object)  # a short click on a sub-plot, beside its surface too: its Panel
     opened = Signal(object)  # a double click on a sub-plot, after that: its Panel
+    hovered = Signal(object, object)  # the mouse rests over a surface: its Panel, and the Hit there
+    left = Signal()  # what was told of the mouse holds no more
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -296,6 +299,8 @@ class ShapeView(QWidget):
         self._canvas.clicked.connect(self._tell_clicked)
         self._canvas.chosen.connect(lambda index: self.chosen.emit(self._grid.panel(index)))
         self._canvas.opened.connect(lambda index: self.opened.emit(self._grid.panel(index)))
+        self._canvas.hovered.connect(self._tell_hovered)
+        self._canvas.left.connect(self.left)
         self._area.insertWidget(0, self._canvas, 1)
         self._canvas.show()  # the layout would only do so with the next turn of the event loop
         self._canvas.look(*self._direction)
@@ -325,6 +330,10 @@ class ShapeView(QWidget):
 
     def _tell_clicked(self, index: int, point_mm: tuple[float, float, float]) -> None:
         self.clicked.emit(self._grid.panel(index), point_mm)
+
+    def _tell_hovered(self, index: int, hit: Hit | None) -> None:
+        if hit is not None:
+            self.hovered.emit(self._grid.panel(index), hit)
 
     def _close_canvas(self) -> None:
         if self._canvas is not None:

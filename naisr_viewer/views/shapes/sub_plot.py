@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import pyvista as pv
 
@@ -67,11 +68,20 @@ def set_colouring(plot: SubPlot, colouring: Colouring | None) -> None:
         mapper.use_lookup_table_scalar_range = True
 
 
-def picked(plot: SubPlot, x: float, y: float) -> tuple[float, float, float] | None:
-    """The point (mm) of a sub-plot's surface that is seen at a pixel of the canvas, counted from below.
+class Hit(NamedTuple):
+    """What is seen of a surface at a pixel.
 
-    None where that is beside the surface.
+    Attributes:
+        point_mm: the point.
+        value: the number at the nearest vertex, in the unit of the surface's numbers; None where it has none.
     """
+
+    point_mm: tuple[float, float, float]
+    value: float | None
+
+
+def picked(plot: SubPlot, x: float, y: float) -> Hit | None:
+    """What a sub-plot's surface has at a pixel of the canvas, counted from below; None beside the surface."""
     picker = pv._vtk.vtkCellPicker()
     picker.SetTolerance(0.0)
     picker.PickFromListOn()
@@ -79,4 +89,6 @@ def picked(plot: SubPlot, x: float, y: float) -> tuple[float, float, float] | No
     if not picker.Pick(x, y, 0.0, plot.renderer):
         return None
     first, second, third = picker.GetPickPosition()
-    return first, second, third
+    numbers = None if plot.result is None else plot.result.colouring
+    value = None if numbers is None else float(numbers.values[picker.GetPointId()])
+    return Hit((first, second, third), value)
