@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import torch
 import trimesh
-from eggs import egg, egg_deepsdf_preset, egg_preset
+from eggs import egg, egg_asdf_preset, egg_deepsdf_preset, egg_preset
 from filelock import FileLock
 
 from naisr_model.data.prepare import PrepareOptions, prepare
@@ -84,6 +84,14 @@ def egg_deepsdf(egg_store: SampleStore, made_once) -> Path:
     file = "eggs.safetensors"
     preset = egg_deepsdf_preset(epochs=60)
     return Path(made_once("egg-deepsdf", lambda out: train(egg_store, preset, out / file)) / file)
+
+
+@pytest.fixture(scope="session")
+def egg_asdf(egg_store: SampleStore, made_once) -> Path:
+    """The same of a model that depends on covariates and has no template."""
+    file = "eggs.safetensors"
+    preset = egg_asdf_preset(epochs=300)
+    return Path(made_once("egg-asdf", lambda out: train(egg_store, preset, out / file)) / file)
 
 
 @pytest.fixture

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import partial
 from pathlib import Path
 
 import nibabel
@@ -17,9 +18,9 @@ from naisr_model.config import Preset, SirenConfig
 from naisr_model.covariates import Covariate, Population
 from naisr_model.data.align import Alignment
 from naisr_model.frames import Frame
-from naisr_model.models.deepsdf import DeepSdfConfig
 from naisr_model.models.factory import build, preset
 from naisr_model.models.naisr.network import NaisrConfig
+from naisr_model.models.single import SingleConfig
 
 RAS = np.diag([-1.0, -1.0, 1.0, 1.0])
 """LPS to RAS and back."""
@@ -50,17 +51,21 @@ def egg_preset(epochs: int) -> Preset:
     return Preset("naisr", network, training)
 
 
-def egg_deepsdf_preset(epochs: int) -> Preset:
-    """The same for DeepSDF, whose codes have age and sex to tell."""
-    network = DeepSdfConfig(latent=4, shape=SirenConfig(32, 1, omega0=5.0))
+def egg_single_preset(model: str, epochs: int) -> Preset:
+    """The same for one of the models of a single network."""
+    network = SingleConfig(latent=4, shape=SirenConfig(32, 1, omega0=5.0))
     training = dataclasses.replace(
-        preset("deepsdf-demo").training,
+        preset(f"{model}-demo").training,
         epochs=epochs,
         batch_shapes=10,
         template_rate=2e-3,
         latent_rate=1e-2,
     )
-    return Preset("deepsdf", network, training)
+    return Preset(model, network, training)
+
+
+egg_deepsdf_preset = partial(egg_single_preset, "deepsdf")
+egg_asdf_preset = partial(egg_single_preset, "asdf")
 
 
 def saved(mesh: trimesh.Trimesh, path: Path, matrix: ArrayLike | None = None) -> Path:
@@ -102,7 +107,7 @@ def untrained(model: str = "naisr") -> Checkpoint:
     values = np.array([[1.0, -1], [3, 1], [5, -1], [7, 1], [9, -1], [4, 1]])
     held_out = np.arange(6) == 5
     population = Population((age, sex), tuple("abcdef"), ("1",) * 6, values, held_out)
-    chosen = {"naisr": egg_preset, "deepsdf": egg_deepsdf_preset}[model](epochs=1)
+    chosen = egg_preset(1) if model == "naisr" else egg_single_preset(model, 1)
     with torch.random.fork_rng():
         torch.manual_seed(0)
         weights = build(chosen, 2).state_dict()

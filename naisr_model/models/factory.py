@@ -20,6 +20,7 @@ MODELS = MappingProxyType(
     {
         "naisr": "naisr_model.models.naisr",
         "deepsdf": "naisr_model.models.deepsdf",
+        "asdf": "naisr_model.models.asdf",
     }
 )
 """Module of each model; importing this one imports none of them."""

@@ -13,8 +13,9 @@ from naisr_model.checkpoint import load
 from naisr_model.config import SirenConfig
 from naisr_model.errors import InputError
 from naisr_model.learning.training.loop import train
-from naisr_model.models.deepsdf import DeepSdf, DeepSdfConfig
+from naisr_model.models.deepsdf import DeepSdf
 from naisr_model.models.factory import build, preset
+from naisr_model.models.single import SingleConfig
 
 HELD_OUT = [(3.3, 1.0), (7.2, -1.0)]
 
@@ -33,7 +34,7 @@ def atlas(path) -> Atlas:
 
 def test_one_point_at_a_time_the_equations_give_the_same():
     torch.manual_seed(0)
-    model = DeepSdf(DeepSdfConfig(latent=5, shape=SirenConfig(16, 2, omega0=4.0)), 2).double()
+    model = DeepSdf(SingleConfig(latent=5, shape=SirenConfig(16, 2, omega0=4.0)), 2).double()
     net, generator = model.network, torch.Generator().manual_seed(1)
     points, codes = (torch.randn(3, *rest, generator=generator).double() for rest in ((7, 3), (5,)))
     values = model(points, points.new_zeros(3, 0), codes)

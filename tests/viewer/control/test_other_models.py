@@ -1,4 +1,4 @@
-"""An atlas whose shapes depend on no covariates and have no template, in the whole window."""
+"""Atlases without a template, in the whole window: of no covariates, and of some that are not told apart."""
 
 from __future__ import annotations
 
@@ -80,3 +80,40 @@ def test_the_demonstration_leaves_out_what_cannot_be_shown(ready, tmp_path):
 def test_a_setting_of_a_covariate_is_refused_in_words(egg_deepsdf, capsys):
     assert main([str(egg_deepsdf), "--set", "age=3"]) == 2
     assert "depend on no covariates" in capsys.readouterr().err
+
+
+@pytest.fixture
+def with_covariates(whole_window, egg_asdf, tmp_path):
+    window, controller = whole_window(Engine(folder=tmp_path / "cache"))
+    controller.open(egg_asdf)
+    finish(window, controller)
+    return window, controller
+
+
+def test_covariates_that_are_not_told_apart_have_sliders_and_one_shape(with_covariates):
+    window, controller = with_covariates
+    assert list(window.covariates.rows) == ["age", "sex"]
+    assert visible_panels(controller.state) == (FULL_SHAPE,)
+    assert "Side by side" not in offered(window) and "Reset all covariates" in offered(window)
+    window.covariates.value_moved.emit("age", 8.0)
+    window.covariates.value_settled.emit("age", 8.0)
+    window.covariates.value_settled.emit("sex", 1.0)
+    finish(window, controller)
+    shown = controller.shown[FULL_SHAPE]
+    assert shown.is_exact and shown.volume_cm3 == pytest.approx(egg(8.0, 1.0).volume / 1000, rel=TOLERATED)
+
+
+def test_a_scan_is_fitted_and_seen_on_another_day(with_covariates, tmp_path):
+    window, controller = with_covariates
+    egg(3.3, 1.0).export(tmp_path / "p01.stl")
+    window.scan_requested.emit(tmp_path / "p01.stl")
+    finish(window, controller)
+    window.patients.known.fit.click()
+    finish(window, controller)
+    assert controller.state.layout is Layout.FIT and dict(controller.state.fit.values)["age"] > 0
+    window.covariates.value_settled.emit("age", 7.2)
+    finish(window, controller)
+    later = controller.shown[FULL_SHAPE]
+    assert later.request.person == controller.state.person > 0
+    assert later.volume_cm3 == pytest.approx(egg(7.2, 1.0).volume / 1000, rel=2 * TOLERATED)
+    assert window.error_text.text() == ""

@@ -1,0 +1,55 @@
+"""A-SDF (Mu et al., ICCV 2021): one network of the point, covariates and code, Phi(p, c, z) = f(p, c, z).
+
+The covariates are what the articulation is there. Nothing keeps the code from saying what a covariate says,
+and no shape of one covariate alone is defined.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar, final
+
+import torch
+from torch import Tensor
+
+from naisr_model.capabilities import Capabilities
+from naisr_model.config import LossWeights, Preset, SirenConfig, TrainingConfig
+from naisr_model.models.single import SingleConfig, SingleNetwork
+
+
+@final
+class ASdf(SingleNetwork):
+    """The network of covariates and code."""
+
+    title: ClassVar[str] = "A-SDF"
+    capabilities: ClassVar[Capabilities] = Capabilities(evolvable=True, transferable=True)
+
+    def __init__(self, config: SingleConfig, covariates: int) -> None:
+        super().__init__(config, covariates + config.latent)
+
+    def conditions(self, covariates: Tensor, latents: Tensor) -> Tensor:
+        """Covariates, then the code."""
+        return torch.cat([covariates, latents], dim=1)
+
+
+MODEL = ASdf
+
+PRESETS: Mapping[str, Preset] = {
+    "asdf-paper": Preset("asdf", SingleConfig(), TrainingConfig()),
+    # As the demo of DeepSDF, with the prior of NAISR's: the covariates have their share to say.
+    "asdf-demo": Preset(
+        "asdf",
+        SingleConfig(latent=64, shape=SirenConfig(width=192, hidden=3, omega0=10.0)),
+        TrainingConfig(
+            epochs=300,
+            batch_shapes=16,
+            surface_points=64,
+            near_points=32,
+            uniform_points=32,
+            template_rate=5e-4,
+            latent_rate=3e-3,
+            cosine=True,
+            loss=LossWeights(latent=0.1),
+        ),
+    ),
+}
