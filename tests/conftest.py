@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import torch
 import trimesh
-from eggs import egg, egg_asdf_preset, egg_deepsdf_preset, egg_preset
+from eggs import egg, egg_asdf_preset, egg_deepsdf_preset, egg_joint_preset, egg_preset
 from filelock import FileLock
 
 from naisr_model.data.prepare import PrepareOptions, prepare
@@ -92,6 +92,14 @@ def egg_asdf(egg_store: SampleStore, made_once) -> Path:
     file = "eggs.safetensors"
     preset = egg_asdf_preset(epochs=300)
     return Path(made_once("egg-asdf", lambda out: train(egg_store, preset, out / file)) / file)
+
+
+@pytest.fixture(scope="session")
+def egg_joint(egg_store: SampleStore, made_once) -> Path:
+    """The same of a model that has a template and one displacement of all covariates."""
+    file = "eggs.safetensors"
+    preset = egg_joint_preset(epochs=300)
+    return Path(made_once("egg-joint", lambda out: train(egg_store, preset, out / file)) / file)
 
 
 @pytest.fixture

@@ -51,6 +51,13 @@ def egg_preset(epochs: int) -> Preset:
     return Preset("naisr", network, training)
 
 
+def egg_joint_preset(epochs: int) -> Preset:
+    """The same for one displacement of all covariates."""
+    plain, training = egg_preset(epochs), preset("joint-demo").training
+    kept = dataclasses.replace(plain.training, population_share=0.0, loss=training.loss)
+    return Preset("joint", plain.network, kept)
+
+
 def egg_single_preset(model: str, epochs: int) -> Preset:
     """The same for one of the models of a single network."""
     network = SingleConfig(latent=4, shape=SirenConfig(32, 1, omega0=5.0))
@@ -107,7 +114,8 @@ def untrained(model: str = "naisr") -> Checkpoint:
     values = np.array([[1.0, -1], [3, 1], [5, -1], [7, 1], [9, -1], [4, 1]])
     held_out = np.arange(6) == 5
     population = Population((age, sex), tuple("abcdef"), ("1",) * 6, values, held_out)
-    chosen = egg_preset(1) if model == "naisr" else egg_single_preset(model, 1)
+    deforming = {"naisr": egg_preset, "joint": egg_joint_preset}
+    chosen = deforming[model](1) if model in deforming else egg_single_preset(model, 1)
     with torch.random.fork_rng():
         torch.manual_seed(0)
         weights = build(chosen, 2).state_dict()

@@ -21,6 +21,7 @@ MODELS = MappingProxyType(
         "naisr": "naisr_model.models.naisr",
         "deepsdf": "naisr_model.models.deepsdf",
         "asdf": "naisr_model.models.asdf",
+        "joint": "naisr_model.models.joint",
     }
 )
 """Module of each model; importing this one imports none of them."""

@@ -22,7 +22,7 @@ NAN, INF = float("nan"), float("inf")
 Tensors = dict[str, torch.Tensor]
 
 
-@pytest.fixture(params=["naisr", "deepsdf", "asdf"])
+@pytest.fixture(params=["naisr", "deepsdf", "asdf", "joint"])
 def good(request, tmp_path) -> Path:
     """A small good atlas of each model."""
     path = tmp_path / f"{request.param}.safetensors"

@@ -132,7 +132,9 @@ def test_a_record_that_names_no_model_is_naisr_s():
 
 
 def test_unknown_models_and_presets_are_named():
-    with pytest.raises(InputError, match=r"unknown shape model 'cubes'; known are asdf, deepsdf, naisr"):
+    with pytest.raises(
+        InputError, match=r"unknown shape model 'cubes'; known are asdf, deepsdf, joint, naisr"
+    ):
         model_class("cubes")
     with pytest.raises(InputError, match=r"no preset 'huge'; choose one of .*demo.*deepsdf-demo"):
         preset("huge")

@@ -10,7 +10,7 @@ from naisr_viewer.app import main
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.panels.kinds import all_panels, visible_panels
 from naisr_viewer.program.headless import finish, run_demo
-from naisr_viewer.state.layouts import FULL_SHAPE, Layout
+from naisr_viewer.state.layouts import FULL_SHAPE, TEMPLATE, Layout
 
 TOLERATED = 0.06
 """Share of a volume by which a code that was trained for some seconds may be off."""
@@ -82,10 +82,10 @@ def test_a_setting_of_a_covariate_is_refused_in_words(egg_deepsdf, capsys):
     assert "depend on no covariates" in capsys.readouterr().err
 
 
-@pytest.fixture
-def with_covariates(whole_window, egg_asdf, tmp_path):
+@pytest.fixture(params=["egg_asdf", "egg_joint"])
+def with_covariates(request, whole_window, tmp_path):
     window, controller = whole_window(Engine(folder=tmp_path / "cache"))
-    controller.open(egg_asdf)
+    controller.open(request.getfixturevalue(request.param))
     finish(window, controller)
     return window, controller
 
@@ -93,8 +93,10 @@ def with_covariates(whole_window, egg_asdf, tmp_path):
 def test_covariates_that_are_not_told_apart_have_sliders_and_one_shape(with_covariates):
     window, controller = with_covariates
     assert list(window.covariates.rows) == ["age", "sex"]
-    assert visible_panels(controller.state) == (FULL_SHAPE,)
-    assert "Side by side" not in offered(window) and "Reset all covariates" in offered(window)
+    can = controller.state.atlas.capabilities
+    assert visible_panels(controller.state) == ((TEMPLATE, FULL_SHAPE) if can.has_template else (FULL_SHAPE,))
+    assert ("Side by side" in offered(window)) == can.has_template
+    assert "Reset all covariates" in offered(window)
     window.covariates.value_moved.emit("age", 8.0)
     window.covariates.value_settled.emit("age", 8.0)
     window.covariates.value_settled.emit("sex", 1.0)
