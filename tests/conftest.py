@@ -13,6 +13,7 @@ import trimesh
 from eggs import egg, egg_asdf_preset, egg_deepsdf_preset, egg_joint_preset, egg_preset
 from filelock import FileLock
 
+from naisr_model.config import Preset
 from naisr_model.data.prepare import PrepareOptions, prepare
 from naisr_model.data.store import SampleStore
 from naisr_model.learning.training.loop import train
@@ -71,35 +72,38 @@ def egg_store(egg_table: Path, made_once) -> SampleStore:
 
 
 @pytest.fixture(scope="session")
-def egg_atlas(egg_store: SampleStore, made_once) -> Path:
-    """An atlas of the eggs, trained for some seconds."""
-    file = "eggs.safetensors"
-    preset = egg_preset(epochs=300)
-    return Path(made_once("egg-atlas", lambda out: train(egg_store, preset, out / file)) / file)
+def trained(egg_store: SampleStore, made_once) -> Callable[[Preset], Path]:
+    """An atlas of the eggs by a preset, trained for some seconds, once for each model."""
+
+    def atlas(preset: Preset) -> Path:
+        file = "eggs.safetensors"
+        return Path(made_once(f"egg-{preset.model}", lambda out: train(egg_store, preset, out / file)) / file)
+
+    return atlas
 
 
 @pytest.fixture(scope="session")
-def egg_deepsdf(egg_store: SampleStore, made_once) -> Path:
-    """The same of a model that depends on no covariates."""
-    file = "eggs.safetensors"
-    preset = egg_deepsdf_preset(epochs=60)
-    return Path(made_once("egg-deepsdf", lambda out: train(egg_store, preset, out / file)) / file)
+def egg_atlas(trained) -> Path:
+    """Of NAISR."""
+    return Path(trained(egg_preset(epochs=300)))
 
 
 @pytest.fixture(scope="session")
-def egg_asdf(egg_store: SampleStore, made_once) -> Path:
-    """The same of a model that depends on covariates and has no template."""
-    file = "eggs.safetensors"
-    preset = egg_asdf_preset(epochs=300)
-    return Path(made_once("egg-asdf", lambda out: train(egg_store, preset, out / file)) / file)
+def egg_deepsdf(trained) -> Path:
+    """Of a model that depends on no covariates."""
+    return Path(trained(egg_deepsdf_preset(epochs=60)))
 
 
 @pytest.fixture(scope="session")
-def egg_joint(egg_store: SampleStore, made_once) -> Path:
-    """The same of a model that has a template and one displacement of all covariates."""
-    file = "eggs.safetensors"
-    preset = egg_joint_preset(epochs=300)
-    return Path(made_once("egg-joint", lambda out: train(egg_store, preset, out / file)) / file)
+def egg_asdf(trained) -> Path:
+    """Of a model that depends on covariates and has no template."""
+    return Path(trained(egg_asdf_preset(epochs=300)))
+
+
+@pytest.fixture(scope="session")
+def egg_joint(trained) -> Path:
+    """Of a model that has a template and one displacement of all covariates."""
+    return Path(trained(egg_joint_preset(epochs=300)))
 
 
 @pytest.fixture

@@ -13,8 +13,8 @@ import torch
 from torch import Tensor
 
 from naisr_model.capabilities import Capabilities
-from naisr_model.config import LossWeights, Preset, SirenConfig, TrainingConfig
-from naisr_model.models.single import SingleConfig, SingleNetwork
+from naisr_model.config import Preset
+from naisr_model.models.single import SingleConfig, SingleNetwork, presets
 
 
 @final
@@ -34,22 +34,4 @@ class ASdf(SingleNetwork):
 
 MODEL = ASdf
 
-PRESETS: Mapping[str, Preset] = {
-    "asdf-paper": Preset("asdf", SingleConfig(), TrainingConfig()),
-    # As the demo of DeepSDF, with the prior of NAISR's: the covariates have their share to say.
-    "asdf-demo": Preset(
-        "asdf",
-        SingleConfig(latent=64, shape=SirenConfig(width=192, hidden=3, omega0=10.0)),
-        TrainingConfig(
-            epochs=300,
-            batch_shapes=16,
-            surface_points=64,
-            near_points=32,
-            uniform_points=32,
-            template_rate=5e-4,
-            latent_rate=3e-3,
-            cosine=True,
-            loss=LossWeights(latent=0.1),
-        ),
-    ),
-}
+PRESETS: Mapping[str, Preset] = presets("asdf", prior=0.1)

@@ -13,7 +13,7 @@ from typing import ClassVar, final
 import torch
 from torch import Tensor, nn
 
-from naisr_model.config import NetworkConfig, SirenConfig
+from naisr_model.config import LossWeights, NetworkConfig, Preset, SirenConfig, TrainingConfig
 from naisr_model.models.base import Linearised, PointFunction, ShapeModel
 from naisr_model.models.siren import SirenStack
 
@@ -77,3 +77,31 @@ class SingleNetwork(ShapeModel, ABC):
     def rated_parameters(self) -> dict[str, list[nn.Parameter]]:
         """All of the one network."""
         return {"template_rate": list(self.parameters())}
+
+
+def presets(model: str, prior: float) -> dict[str, Preset]:
+    """The training at the papers' size, and one for two CPU cores, as the demo of NAISR.
+
+    That one has low frequencies and many points far from the surface. Nothing shrinks a template here, so the
+    paper's own terms do.
+
+    Args:
+        model: its name.
+        prior: weight of the prior on the codes, in the demo.
+    """
+    training = TrainingConfig(
+        epochs=300,
+        batch_shapes=16,
+        surface_points=64,
+        near_points=32,
+        uniform_points=32,
+        template_rate=5e-4,
+        latent_rate=3e-3,
+        cosine=True,
+        loss=LossWeights(latent=prior),
+    )
+    small = SingleConfig(latent=64, shape=SirenConfig(width=192, hidden=3, omega0=10.0))
+    return {
+        f"{model}-paper": Preset(model, SingleConfig(), TrainingConfig()),
+        f"{model}-demo": Preset(model, small, training),
+    }
