@@ -153,8 +153,17 @@ def stoppable() -> Iterator[Progress]:
         signal.signal(signal.SIGINT, previous)
 
 
+@contextlib.contextmanager
+def told_anyway(tell: Callable[[], object]) -> Iterator[None]:
+    """Write what was found out, then tell it: no file depends on who listens, and no word on a full disk."""
+    try:
+        yield
+    finally:
+        tell()
+
+
 def write_json(path: Path | None, record: object) -> None:
-    """Write the figures where a file was named; last of all, so that they are told even where that fails."""
+    """Write the figures where a file was named."""
     if path is not None:
         with replacing(path) as temporary:
             temporary.write_text(json.dumps(record, indent=1), encoding="utf-8")

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from cyclopts import App, Parameter
 
-from naisr_model.cli.console import bar, write_json
+from naisr_model.cli.console import bar, told_anyway, write_json
 from naisr_model.cli.options import FileToWrite, JsonFile
 from naisr_model.errors import InputError
 from naisr_model.evaluation.studies import STUDIES
@@ -32,8 +32,8 @@ def _command(name: str, kind: type[Study[Any]]) -> Callable[..., None]:
             raise InputError(f"{journal} is to be the journal and the report; name two files")
         with bar(name) as progress:
             report = run(study, workers=workers, journal=journal, progress=progress)
-        print(study.markdown(report))
-        write_json(json_file, report)
+        with told_anyway(lambda: print(study.markdown(report))):
+            write_json(json_file, report)
 
     measure.__annotations__["study"] = Annotated[kind, Parameter(name="*")]
     return measure

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from naisr_model.cli.console import bar, stoppable, write_json
+from naisr_model.cli.console import bar, stoppable, told_anyway, write_json
 from naisr_model.cli.options import AtlasFile, FolderToWrite, JsonFile
 from naisr_model.errors import InputError
 from naisr_model.terminal import say
@@ -74,10 +74,10 @@ def fit(
     _require_own(out, patient)
     fitted, intake = _fitted(patient, _loaded(atlas), reading)
     record, people = fit_record(fitted), [fitted.individual]
-    _tell_fit(fitted, record["alternatives"])
-    if out is not None:
-        write_series(out, people, series_records(people), patient)
-    write_json(json_file, {"patient": intake.to_json(), **record})
+    with told_anyway(lambda: _tell_fit(fitted, record["alternatives"])):
+        if out is not None:
+            write_series(out, people, series_records(people), patient)
+        write_json(json_file, {"patient": intake.to_json(), **record})
 
 
 def transfer(
@@ -181,8 +181,8 @@ def measure(
     with bar("measuring") as progress:
         norms = norms_of(loaded, progress=progress)
     record = measure_record(norms, values, None if fitted is None else fitted.individual)
-    _tell_measures(record, loaded.covariates, fitted)
-    write_json(json_file, record)
+    with told_anyway(lambda: _tell_measures(record, loaded.covariates, fitted)):
+        write_json(json_file, record)
 
 
 def _require_own(out: Path | None, patient: Path) -> None:
@@ -272,14 +272,18 @@ def _tell_series(
 
     with bar("measuring") as progress:
         records = series_records(people, progress)
+    with told_anyway(lambda: _tell_volumes(people, records, fitted.lasting)):
+        if out is not None:
+            write_series(out, people, records, patient)
+        write_json(json_file, {"patient": intake.to_json(), "lasting": fitted.lasting, "shapes": records})
+
+
+def _tell_volumes(people: Sequence[Any], records: Sequence[Mapping[str, Any]], lasting: float) -> None:
     for person, record in zip(people, records, strict=True):
         where = _row(person.atlas.covariates, person.covariates)
         low, high = record["volume_low_cm3"], record["volume_high_cm3"]
         print(f"{where}: {record['volume_cm3']:.1f} cm³ ({low:.1f} to {high:.1f})")
-    print(f"at other covariates {100 * fitted.lasting:.0f} % of what sets the patient apart is kept")
-    if out is not None:
-        write_series(out, people, records, patient)
-    write_json(json_file, {"patient": intake.to_json(), "lasting": fitted.lasting, "shapes": records})
+    print(f"at other covariates {100 * lasting:.0f} % of what sets the patient apart is kept")
 
 
 def _tell_measures(record: Mapping[str, Any], covariates: Iterable[Covariate], fitted: Any) -> None:

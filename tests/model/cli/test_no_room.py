@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import io
+import json
+import sys
 from pathlib import Path
 
 import pytest
@@ -63,3 +66,18 @@ def test_a_command_that_finds_no_room(what, egg_atlas, egg_store, egg_table, tmp
     whole = {name for name, content in files(out).items() if content}
     assert {name for name in whole if not name.startswith(LOGS)} == set()
     assert [name for name in files(out) if Path(name).name.startswith(".")] == []
+
+
+class Deaf(io.StringIO):
+    """Nobody listens any more."""
+
+    def write(self, _text: str) -> int:
+        raise BrokenPipeError
+
+
+def test_figures_are_in_their_file_where_nobody_listens(egg_atlas, tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "stdout", Deaf())
+    words = ["fit", saved(egg(6.0, 1.0), tmp_path / "egg.stl"), "--atlas", egg_atlas, *FIT[3:]]
+    cli.main([*map(str, words), "--json", str(tmp_path / "fit.json"), "--out", str(tmp_path / "fit")])
+    assert json.loads((tmp_path / "fit.json").read_text())["volume_cm3"] > 0
+    assert (tmp_path / "fit" / "volumes.csv").exists()
