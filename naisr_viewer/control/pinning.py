@@ -12,7 +12,7 @@ from naisr_viewer.control.controller import Controller
 from naisr_viewer.control.worker import Worker
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.panels.pins import can_pin, ledger_request
-from naisr_viewer.state.explorer import ExplorerState, pinned, without_pins
+from naisr_viewer.state.explorer import ExplorerState, pinned, without_pin, without_pins
 from naisr_viewer.state.layouts import Panel
 from naisr_viewer.state.pins import Ledger, LedgerRequest, Point
 from naisr_viewer.state.requests import SurfaceResult
@@ -40,6 +40,7 @@ class PinDesk(QObject):
         self._asked: LedgerRequest | None = None
         window.shapes.clicked.connect(self.pin)
         window.unpin_requested.connect(self.unpin)
+        window.pin_removal_requested.connect(self.unpin_one)
         window.closing.connect(self.close)
         controller.changed.connect(self.follow)
         for worker in (finder, teller):
@@ -56,6 +57,10 @@ class PinDesk(QObject):
     def unpin(self) -> None:
         """Take all pins away."""
         self._controller.commit(without_pins(self._controller.state))
+
+    def unpin_one(self, number: int) -> None:
+        """Take one pin away."""
+        self._controller.commit(without_pin(self._controller.state, number))
 
     def follow(self, state: ExplorerState) -> None:
         """Tell of the pins as the shapes are now."""

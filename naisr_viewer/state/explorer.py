@@ -234,6 +234,12 @@ def pinned(state: ExplorerState, origin_mm: Point) -> ExplorerState:
     return replace(state, pins=with_pin(state.pins, origin_mm), drawer=state.drawer or Tab.POINT)
 
 
+def without_pin(state: ExplorerState, number: int) -> ExplorerState:
+    """One place no longer pinned; with the last of them nothing is told of any."""
+    pins = tuple(pin for pin in state.pins if pin.number != number)
+    return replace(state, pins=pins) if pins else without_pins(state)
+
+
 def without_pins(state: ExplorerState) -> ExplorerState:
     """No place pinned, and nothing told of any."""
     return replace(state, pins=(), drawer=None if state.drawer is Tab.POINT else state.drawer)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QScrollArea, QSizePolicy, QWidget
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QResizeEvent
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QScrollArea, QSizePolicy, QToolButton, QWidget
 
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.pins import Entry, Ledger, Part, Pin
@@ -62,6 +62,11 @@ class EntryChart(QWidget):
         self._scale_mm, self._ink = LEAST_SCALE_MM, Ink()
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setMaximumWidth(WIDEST_PX)
+        self.remove = QToolButton(self, autoRaise=True)
+        self.remove.setText("×")
+        self.remove.setFixedSize(TITLE_PX, TITLE_PX - 2)
+        self.remove.setToolTip(f"Remove {words.title(pin.number).lower()}")
+        self.remove.setAccessibleName(self.remove.toolTip())
 
     def show_entry(self, entry: Entry | None, scale_mm: float, ink: Ink) -> None:
         """Show what moved the place; None where it has no place.
@@ -78,6 +83,11 @@ class EntryChart(QWidget):
         self.updateGeometry()
         self.update()
 
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """The cross stays at the far end of the title."""
+        super().resizeEvent(event)
+        self.remove.move(self.width() - self.remove.width(), 1)
+
     def sizeHint(self) -> QSize:
         """A line for each cause."""
         count = 1 if self._entry is None else len(words.lines(self._entry))
@@ -90,7 +100,11 @@ class EntryChart(QWidget):
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(pin_colour(self._pin.number)))
         painter.drawEllipse(QRectF(0, (TITLE_PX - DOT_PX) / 2, DOT_PX, DOT_PX))
-        self._write(painter, QRectF(DOT_PX + 6, 0, self.width(), TITLE_PX), words.title(self._pin.number))
+        self._write(
+            painter,
+            QRectF(DOT_PX + 6, 0, self.width() - DOT_PX - 2 * TITLE_PX, TITLE_PX),
+            words.title(self._pin.number),
+        )
         if self._entry is None:
             self._write(painter, QRectF(0, TITLE_PX, self.width(), LINE_PX), words.NO_PLACE, muted=True)
         else:
@@ -134,6 +148,8 @@ class EntryChart(QWidget):
 class LedgerPage(QScrollArea):
     """The pinned places beside one another, or how to pin one."""
 
+    removal_requested = Signal(int)  # number of a pin
+
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._theme = LIGHT
@@ -173,7 +189,8 @@ class LedgerPage(QScrollArea):
             chart.hide()
             chart.deleteLater()
         self.charts = {pin: EntryChart(pin, self) for pin in pins}
-        for chart in self.charts.values():
+        for pin, chart in self.charts.items():
+            chart.remove.clicked.connect(lambda _, number=pin.number: self.removal_requested.emit(number))
             self._row.addWidget(chart, 1)
 
     def _fill(self) -> None:

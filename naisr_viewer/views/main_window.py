@@ -99,6 +99,7 @@ class MainWindow(QMainWindow):
     quantity_chosen = Signal(object)  # a Quantity that the surfaces shall be coloured by
     shared_toggled = Signal(bool)  # whether all surfaces with numbers of one unit share its scale
     unpin_requested = Signal()  # Edit > Remove pins
+    pin_removal_requested = Signal(int)  # number of a pin whose cross was clicked
     drawer_requested = Signal(object)  # a Tab of the drawer, or None to close it
     curve_requested = Signal(object)  # a CurveChoice: another measure, or along another covariate
     curve_place_chosen = Signal(Path)  # where the curve shall go
@@ -432,6 +433,7 @@ class MainWindow(QMainWindow):
         self._centre.maps.quantity_chosen.connect(self.quantity_chosen)
         self._centre.maps.shared_toggled.connect(self.shared_toggled)
         self._centre.drawer.tab_requested.connect(self.drawer_requested)
+        self._centre.ledger.removal_requested.connect(self.pin_removal_requested)
         self._centre.matrix.changed.connect(self.matrix_requested)
         self._connect_curve()
         self.patients.open_requested.connect(self.ask_scan)

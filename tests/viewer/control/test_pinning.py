@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QLabel
 
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.panels.kinds import visible_panels
-from naisr_viewer.program.headless import finish
+from naisr_viewer.program.headless import finish, pause
 from naisr_viewer.state.drawer import Tab
 from naisr_viewer.state.layouts import Layout
 from naisr_viewer.views.colours import pin_colour
@@ -76,6 +76,23 @@ def test_a_click_pins_a_place_in_every_shape_and_escape_takes_it_away(ready, qtb
     assert not told(window) and controller.state.pins == () and controller.state.drawer is None
     QTest.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
     qtbot.waitUntil(lambda: all(dots(canvas, 1, cells)), timeout=PATIENCE_MS)
+
+
+def test_a_cross_takes_one_place_away(ready, qtbot):
+    window, controller = ready
+    canvas, cells = window.findChild(Canvas), len(visible_panels(controller.state))
+    place = middle(canvas, cells - 1, cells)
+    for up in (0, 20):
+        QTest.mouseClick(canvas, Qt.MouseButton.LeftButton, pos=place - QPoint(0, up))
+        pause(0.5)  # else it is a double click
+    qtbot.waitUntil(lambda: set(told(window)) == {"Place 1", "Place 2"}, timeout=PATIENCE_MS)
+    first = next(
+        chart for chart in window.findChildren(EntryChart) if chart.remove.toolTip() == "Remove place 1"
+    )
+    QTest.mouseClick(first.remove, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: set(told(window)) == {"Place 2"}, timeout=PATIENCE_MS)
+    assert [pin.number for pin in controller.state.pins] == [2]
+    qtbot.waitUntil(lambda: not any(dots(canvas, 1, cells)), timeout=PATIENCE_MS)
 
 
 def test_turning_the_shapes_and_clicking_beside_them_pins_nothing(ready, qtbot):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from naisr_viewer.state.drawer import Tab
-from naisr_viewer.state.explorer import ExplorerState, opened, pinned, without_pins
+from naisr_viewer.state.explorer import ExplorerState, opened, pinned, without_pin, without_pins
 from naisr_viewer.state.history import History, record, redo, undo
 
 
@@ -34,6 +34,13 @@ def test_the_fourth_takes_the_place_and_number_of_the_first(start):
 def test_a_pin_is_told_of_unless_something_else_is_open(start):
     assert with_pins(start, 1).drawer is Tab.POINT
     assert without_pins(with_pins(start, 2)).drawer is None
+
+
+def test_one_is_removed_and_its_number_is_free_again(start):
+    state = without_pin(with_pins(start, 3), 2)
+    assert numbers(state) == [1, 3] and state.drawer is Tab.POINT
+    assert sorted(numbers(pinned(state, (9.0, 0.0, 0.0)))) == [1, 2, 3]
+    assert without_pin(with_pins(start, 1), 1).drawer is None
 
 
 def test_pins_are_undone_and_redone(start):
