@@ -115,6 +115,7 @@ def make_window(
     from naisr_viewer.control.matrix import MatrixDesk
     from naisr_viewer.control.measuring import CurveDesk, NormsDesk
     from naisr_viewer.control.pinning import PinDesk
+    from naisr_viewer.control.playing import Player
     from naisr_viewer.control.preferences import Preferences
     from naisr_viewer.control.sessions import SessionDesk
     from naisr_viewer.control.worker import Worker
@@ -135,6 +136,7 @@ def make_window(
     NormsDesk(window, controller, engine, Worker())  # and this
     SessionDesk(window, controller, engine, clinic, Worker(), Worker(), kept)  # and this
     MatrixDesk(window, controller, engine)  # and this
+    Player(window, controller)  # and this
     return window, controller
 
 

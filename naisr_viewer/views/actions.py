@@ -49,6 +49,7 @@ class Window(Protocol):
     layout_requested: SignalInstance
     theme_requested: SignalInstance
     unpin_requested: SignalInstance
+    play_requested: SignalInstance
     drawer_requested: SignalInstance
     about_requested: SignalInstance
     preferences_requested: SignalInstance
@@ -293,6 +294,16 @@ COMMANDS = (
     ),
     *DRAWER,
     Command(
+        "play",
+        "Play",
+        lambda window: window.play_requested.emit(),
+        keys=("F5",),
+        tip="Move the covariate that was moved last to and fro; again to stop",
+        needs=AT_REST,
+        is_switch=True,
+        offered=lambda atlas: bool(atlas.covariates),
+    ),
+    Command(
         "reset camera",
         "Reset camera",
         lambda window: window.shapes.reset_camera(),
@@ -326,7 +337,7 @@ MENUS = {
     "&Edit": ("undo", "redo", "reset all", "unpin", SEPARATOR, "preferences"),
     "&View": (
         *_names(LAYOUTS), "patients", *_names(DRAWER), SEPARATOR,
-        "reset camera", *_names(LOOKS), SEPARATOR, *_names(THEMES),
+        "play", SEPARATOR, "reset camera", *_names(LOOKS), SEPARATOR, *_names(THEMES),
     ),
     "&Help": (*_names(DOCUMENTS), SEPARATOR, "about"),
 }  # fmt: skip

@@ -99,6 +99,7 @@ class MainWindow(QMainWindow):
     quantity_chosen = Signal(object)  # a Quantity that the surfaces shall be coloured by
     shared_toggled = Signal(bool)  # whether all surfaces with numbers of one unit share its scale
     unpin_requested = Signal()  # Edit > Remove pins
+    play_requested = Signal()  # View > Play: whether it plays is for who moves the covariate to say
     pin_removal_requested = Signal(int)  # number of a pin whose cross was clicked
     drawer_requested = Signal(object)  # a Tab of the drawer, or None to close it
     curve_requested = Signal(object)  # a CurveChoice: another measure, or along another covariate
@@ -211,6 +212,10 @@ class MainWindow(QMainWindow):
         """Enable what can be undone and redone."""
         self._can_undo, self._can_redo = can_undo, can_redo
         self._enable()
+
+    def show_playing(self, is_playing: bool) -> None:
+        """Whether a covariate moves by itself."""
+        self._actions["play"].setChecked(is_playing)
 
     def show_left(self, can_go_on: bool) -> None:
         """Whether there is a session of an earlier run to go on with."""
