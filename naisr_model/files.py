@@ -30,15 +30,16 @@ FULL = frozenset({errno.ENOSPC, errno.EDQUOT})
 def replacing(path: Path) -> Iterator[Path]:
     """Yield a temporary path with the same suffix that takes the place of ``path`` on success.
 
-    On an exception the temporary file is removed and what stood at ``path`` stays as it was. A link is
-    followed. What is written in between says by an :class:`OSError` that it could not be; a writer that says
-    it in another way writes into memory first.
+    On an exception the temporary file is removed, with the folders that were made for it, and what stood at
+    ``path`` stays as it was. A link is followed. What is written in between says by an :class:`OSError` that
+    it could not be; a writer that says it in another way writes into memory first.
 
     Raises:
         InputError: for a path that is no place for a file, or when the file cannot be written.
     """
     target = checked_place(path)
     temporary = target.with_name(f".{target.stem}.{secrets.token_hex(4)}{target.suffix}")
+    new_folders = [folder for folder in target.parents if not folder.exists()]
     with telling(path):
         target.parent.mkdir(parents=True, exist_ok=True)
         try:
@@ -49,8 +50,12 @@ def replacing(path: Path) -> Iterator[Path]:
                 flush(file.fileno())
             _open_to_others(temporary)
             os.replace(temporary, target)
-        finally:
+        except BaseException:
             temporary.unlink(missing_ok=True)
+            with suppress(OSError):  # others may have put something there
+                for folder in new_folders:
+                    folder.rmdir()
+            raise
 
 
 def write_all(files: Iterable[tuple[Path, bytes]]) -> None:

@@ -253,6 +253,10 @@ def test_files_that_belong_together_are_replaced_together(tmp_path, no_room):
         write_all((path, content_or_refusal(path)) for path in (small, large))
     assert (small.read_bytes(), large.read_bytes()) == (b"1", b"2")
     assert sorted(os.listdir(tmp_path)) == ["a.txt", "new"] and os.listdir(large.parent) == ["b.txt"]
+    elsewhere = tmp_path / "new" / "inner" / "deep"
+    with no_room(100), pytest.raises(InputError, match="File too large"):
+        write_all([(elsewhere / "a.txt", b"1"), (elsewhere / "b.txt", bytes(1000))])
+    assert os.listdir(large.parent) == ["b.txt"]  # nor are there folders that nobody asked for
 
 
 def content_or_refusal(path: Path) -> bytes:
