@@ -81,11 +81,12 @@ class Opening:
 
 
 def first_picture(atlas: AtlasCard) -> SurfaceRequest:
-    """What every sub-plot shows while all covariates are at their centre, and all previews are made of."""
+    """What every sub-plot shows before a covariate is moved, and all previews are made of."""
     if atlas.capabilities.vanishes_at_centre:
         return SurfaceRequest(atlas.path, TEMPLATE, (), EXACT_RESOLUTION)
-    centre = tuple((covariate.name, covariate.centre) for covariate in atlas.covariates)
-    return SurfaceRequest(atlas.path, FULL_SHAPE, centre, EXACT_RESOLUTION)
+    names = [covariate.name for covariate in atlas.covariates]
+    start = tuple(zip(names, atlas.start, strict=True))
+    return SurfaceRequest(atlas.path, FULL_SHAPE, start, EXACT_RESOLUTION)
 
 
 class Cache:

@@ -35,9 +35,17 @@ class AtlasCard:
     written: Stamp = None
 
     @property
-    def centre(self) -> RealVector:
-        """The population mean, where every slider starts."""
-        return tuple(covariate.centre for covariate in self.covariates)
+    def start(self) -> RealVector:
+        """Where every slider starts: the population mean, halfway between the levels of a binary covariate.
+
+        A model whose shape there is not the template has learned nothing between the levels, where nobody was
+        seen: it starts at the first of them.
+        """
+        return tuple(self._start_of(covariate) for covariate in self.covariates)
+
+    def _start_of(self, covariate: Covariate) -> float:
+        is_known = covariate.kind == "continuous" or self.capabilities.vanishes_at_centre
+        return covariate.centre if is_known else covariate.range[0]
 
     def read_values(self, option: str, settings: Sequence[str]) -> dict[str, float]:
         """Real values by name from ``["age=120", "sex=M"]``, which stand behind ``option``.

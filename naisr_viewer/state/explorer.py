@@ -74,7 +74,7 @@ class ExplorerState:
     @property
     def heard(self) -> Named:
         """The same with those that are muted at the population centre, where they move nothing."""
-        centre = dict(self.with_names(self.atlas.centre)) if self.atlas else {}
+        centre = dict(self.with_names(self.atlas.start)) if self.atlas else {}
         return tuple((name, centre[name] if name in self.muted else value) for name, value in self.named)
 
     @property
@@ -106,7 +106,7 @@ class ExplorerState:
         """Where the covariates are reset to: the patient's, or the population mean."""
         if self.fit is not None:
             return tuple(value for _, value in self.fit.values)
-        return self.atlas.centre if self.atlas else ()
+        return self.atlas.start if self.atlas else ()
 
     @property
     def can_forecast(self) -> bool:
@@ -135,7 +135,7 @@ def opened(state: ExplorerState, atlas: AtlasCard) -> ExplorerState:
     drawer = state.drawer if state.drawer in tabs_of(atlas) else None
     return ExplorerState(
         atlas,
-        atlas.centre,
+        atlas.start,
         layout,
         follow=state.follow,
         has_ghost=state.has_ghost,

@@ -114,7 +114,7 @@ def own_values(matrix: Matrix, cell: Cell) -> dict[str, float]:
 def values_at(atlas: AtlasCard, matrix: Matrix, cell: Cell, present: RealVector) -> RealVector:
     """All covariates of a cell: those beside its own are as at ``present``, on the axes at their centre."""
     own = own_values(matrix, cell)
-    rest = present if is_inner(cell) else atlas.centre
+    rest = present if is_inner(cell) else atlas.start
     return tuple(own.get(each.name, value) for each, value in zip(atlas.covariates, rest, strict=True))
 
 

@@ -83,9 +83,12 @@ class CovariateRow(QWidget):
         """
         self._home = value
         self.histogram.show_patient(value if is_patient else None, interval)
-        whose = f"patient ({reading(self.covariate, value)})"
-        mean = f"population mean ({mean_reading(self.covariate)})"
-        self.reset.setToolTip(as_tip(f"Back to the {whose if is_patient else mean}"))
+        goal = reading(self.covariate, value)
+        if is_patient:
+            goal = f"the patient ({goal})"
+        elif value == self.covariate.centre:
+            goal = f"the population mean ({mean_reading(self.covariate)})"
+        self.reset.setToolTip(as_tip(f"Back to {goal}"))
 
     def set_value(self, value: float) -> None:
         """Show a real value without telling anybody."""

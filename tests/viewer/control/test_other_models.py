@@ -97,6 +97,13 @@ def test_covariates_that_are_not_told_apart_have_sliders_and_one_shape(with_cova
     assert visible_panels(controller.state) == ((TEMPLATE, FULL_SHAPE) if can.has_template else (FULL_SHAPE,))
     assert ("Side by side" in offered(window)) == can.has_template
     assert "Reset all covariates" in offered(window)
+    sex = dict(controller.state.named)["sex"]
+    assert sex == (0.0 if can.vanishes_at_centre else -1.0)  # where it knows shapes
+    goal = "the population mean (in the middle)" if can.vanishes_at_centre else "F"
+    assert window.covariates.rows["sex"].reset.toolTip() == f"Back to {goal}"
+    average = egg(dict(controller.state.named)["age"], sex).volume / 1000
+    assert controller.shown[FULL_SHAPE].is_exact
+    assert controller.shown[FULL_SHAPE].volume_cm3 == pytest.approx(average, rel=TOLERATED)
     window.covariates.value_moved.emit("age", 8.0)
     window.covariates.value_settled.emit("age", 8.0)
     window.covariates.value_settled.emit("sex", 1.0)

@@ -69,13 +69,13 @@ def test_cells_have_their_own_covariates_and_the_rest_as_it_is_off_the_axes(card
     assert values_at(card, matrix, (2, 3), present) == (age, weight, 1.0)
     assert values_at(card, matrix, (2, 0), present) == (age, 35.0, 0.0)
     assert values_at(card, matrix, (0, 3), present) == (100.0, weight, 0.0)
-    assert values_at(card, matrix, (0, 0), present) == card.centre
+    assert values_at(card, matrix, (0, 0), present) == card.start
 
 
 def test_the_nearest_cell_is_the_one_whose_covariates_were_taken(card, matrix):
     for cell in cells_of(matrix):
         assert nearest(card, matrix, values_at(card, matrix, cell, (20.0, 70.0, 1.0))) == cell
-    assert nearest(card, matrix, card.centre) == (0, 0)
+    assert nearest(card, matrix, card.start) == (0, 0)
     assert nearest(card, matrix, (220.0, 95.0, 1.0)) == (4, 3)
 
 

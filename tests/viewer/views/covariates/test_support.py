@@ -135,7 +135,7 @@ def test_a_patient_is_told_from_others_by_colour(panel, card, qtbot):
     for key, (age, weight) in places.items():
         known = (("age", age), ("weight", weight))
         state = with_patient(state, OpenScan(key, f"{key}.stl", Reading(Path("p.stl")), scan, known))
-    panel.show_values(replace(state, patient=None, values=card.centre))
+    panel.show_values(replace(state, patient=None, values=card.start))
     chart = panel.support.chart
     image = chart.grab().toImage()
     ratio = image.devicePixelRatio()
