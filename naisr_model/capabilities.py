@@ -7,14 +7,16 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Capabilities:
-    """What a model can do, in the terms of Table 1 of Jiao et al. (ICLR 2024), and two facts about it.
+    """What a model can do, in the terms of Table 1 of Jiao et al. (ICLR 2024), and some facts about it.
 
     Attributes:
         implicit: a shape is the zero level set of a field that is defined everywhere.
         deformable: that field is a template's at points that were moved, so that shapes correspond.
         disentangleable: the shape of one covariate alone can be shown.
+        additive: the displacements of the covariates add up to that of the shape.
         evolvable: shapes depend on covariates and can be followed along them.
         transferable: a person's shape is known at other covariates than those at which it was seen.
+        stepwise: points are moved step by step, and the template is asked underway as well.
         invertible: p -> p + d(p) cannot fold.
         has_template: there is a shape T that all others are deformed from.
         vanishes_at_centre: nothing is displaced where all covariates are at their centre, whatever the
@@ -24,8 +26,10 @@ class Capabilities:
     implicit: bool = True
     deformable: bool = False
     disentangleable: bool = False
+    additive: bool = False
     evolvable: bool = False
     transferable: bool = False
+    stepwise: bool = False
     invertible: bool = False
     has_template: bool = False
     vanishes_at_centre: bool = False
@@ -33,4 +37,4 @@ class Capabilities:
     @property
     def trackable(self) -> bool:
         """Whether the template's surface can be carried to a shape from tables of displacements."""
-        return self.deformable and self.disentangleable and self.vanishes_at_centre
+        return self.deformable and self.additive and self.vanishes_at_centre

@@ -106,6 +106,9 @@ class LossWeights:
             carry any offset common to everybody and the template would stand elsewhere.
         ridge: mean squared displacement at z = 0, which settles what the data leave open.
         folding: mean of max(0, -det(I + grad d)) at surface points; 0 leaves it out.
+        underway: of what the template says after earlier steps, see ``losses.underway``.
+        pointwise: length of the displacements, see ``losses.pointwise``.
+        pointpair: how much displacements differ from place to place, see ``losses.pointpair``.
     """
 
     surface_eikonal: Weight = 10.0
@@ -121,6 +124,9 @@ class LossWeights:
     centring: Weight = 0.0
     ridge: Weight = 0.0
     folding: Weight = 0.0
+    underway: Weight = 0.0
+    pointwise: Weight = 0.0
+    pointpair: Weight = 0.0
 
 
 @dataclass(frozen=True)
@@ -136,6 +142,8 @@ class TrainingConfig:
         template_rate: Adam's learning rate for the network that gives distances, a template's or a shape's.
         displacement_rate: Adam's learning rate for the networks that move points, where there are any.
         latent_rate: Adam's learning rate for the codes.
+        hidden_rate: Muon's learning rate for the matrices between hidden layers of sines, to be divided by
+            their omega0; 0 leaves them to Adam.
         cosine: let the rates fall to zero along a cosine instead of staying constant.
         population_share: first part of the training, in which every code is 0, so that the
             covariates explain what they can before the codes may.
@@ -154,6 +162,7 @@ class TrainingConfig:
     template_rate: Rate = 5e-5
     displacement_rate: Rate = 5e-5
     latent_rate: Rate = 1e-3
+    hidden_rate: Annotated[float, Range(0, 1000)] = 0.0
     cosine: bool = False
     population_share: Share = 0.0
     residual_latents: bool = False

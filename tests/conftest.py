@@ -10,9 +10,10 @@ from pathlib import Path
 import pytest
 import torch
 import trimesh
-from eggs import egg, egg_asdf_preset, egg_deepsdf_preset, egg_joint_preset, egg_preset
+from eggs import egg, egg_asdf_preset, egg_deepsdf_preset, egg_joint_preset, egg_preset, moved_as_in
 from filelock import FileLock
 
+from naisr_model.checkpoint import save
 from naisr_model.config import Preset
 from naisr_model.data.prepare import PrepareOptions, prepare
 from naisr_model.data.store import SampleStore
@@ -85,7 +86,7 @@ def trained(egg_store: SampleStore, made_once) -> Callable[[Preset], Path]:
 @pytest.fixture(scope="session")
 def egg_atlas(trained) -> Path:
     """Of NAISR."""
-    return Path(trained(egg_preset(epochs=300)))
+    return Path(trained(egg_preset(epochs=100)))
 
 
 @pytest.fixture(scope="session")
@@ -97,13 +98,22 @@ def egg_deepsdf(trained) -> Path:
 @pytest.fixture(scope="session")
 def egg_asdf(trained) -> Path:
     """Of a model that depends on covariates and has no template."""
-    return Path(trained(egg_asdf_preset(epochs=300)))
+    return Path(trained(egg_asdf_preset(epochs=200)))
 
 
 @pytest.fixture(scope="session")
 def egg_joint(trained) -> Path:
     """Of a model that has a template and one displacement of all covariates."""
-    return Path(trained(egg_joint_preset(epochs=300)))
+    return Path(trained(egg_joint_preset(epochs=100)))
+
+
+@pytest.fixture(scope="session")
+def egg_invertible(egg_atlas, made_once) -> Path:
+    """Of a model that tells covariates apart and does not add up their displacements."""
+    file = "eggs.safetensors"
+
+    made = made_once("egg-invertible", lambda out: save(out / file, moved_as_in("invertible", egg_atlas)))
+    return Path(made / file)
 
 
 @pytest.fixture

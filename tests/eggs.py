@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import nibabel
 import nrrd
@@ -13,7 +14,7 @@ import torch
 import trimesh
 from numpy.typing import ArrayLike, NDArray
 
-from naisr_model.checkpoint import Checkpoint
+from naisr_model.checkpoint import Checkpoint, load
 from naisr_model.config import Preset, SirenConfig
 from naisr_model.covariates import Covariate, Population
 from naisr_model.data.align import Alignment
@@ -71,8 +72,49 @@ def egg_single_preset(model: str, epochs: int) -> Preset:
     return Preset(model, network, training)
 
 
+def egg_warping_preset(model: str, epochs: int) -> Preset:
+    """The same for a model that deforms a template in a way of its own."""
+    plain, given = egg_preset(epochs), preset(f"{model}-demo")
+    moving = {"dit": "warp_width", "ndf": "velocity", "invertible": "displacement"}[model]
+    sizes: dict[str, Any] = {
+        "latent": 4,
+        "template": SirenConfig(32, 1, omega0=5.0),
+        moving: 24 if model == "dit" else SirenConfig(16, 1, omega0=2.0),
+    }
+    of_codes = given.training.residual_latents
+    training = dataclasses.replace(
+        plain.training,
+        population_share=given.training.population_share,
+        residual_latents=of_codes,
+        latent_rate=plain.training.latent_rate if of_codes else 1e-2,
+        loss=given.training.loss,
+    )
+    return Preset(model, dataclasses.replace(given.network, **sizes), training)
+
+
 egg_deepsdf_preset = partial(egg_single_preset, "deepsdf")
 egg_asdf_preset = partial(egg_single_preset, "asdf")
+
+
+def moved_as_in(model: str, atlas: Path) -> Checkpoint:
+    """The eggs' atlas of NAISR with its template, and points moved in another model's way.
+
+    What moves them is NAISR's own networks where there are covariates; else it is random, as are the codes.
+    """
+    known = load(atlas)
+    preset = egg_warping_preset(model, 1)
+    with torch.random.fork_rng():
+        torch.manual_seed(0)
+        weights = build(preset, len(known.population.covariates)).state_dict()
+        codes = torch.randn(known.latents.shape).numpy()
+    own = {
+        name.replace("displacement_networks", "velocity_networks"): one for name, one in known.weights.items()
+    }
+    weights |= {name: own[name] for name in set(weights) & set(own)}
+    last = [name for name in weights if name.endswith("last_weight") and name not in own]
+    weights |= {name: 10 * weights[name] for name in last}
+    latents = known.latents if model == "invertible" else codes
+    return dataclasses.replace(known, preset=preset, weights=weights, latents=latents)
 
 
 def saved(mesh: trimesh.Trimesh, path: Path, matrix: ArrayLike | None = None) -> Path:

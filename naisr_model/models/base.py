@@ -23,6 +23,7 @@ from naisr_model.capabilities import Capabilities
 from naisr_model.config import NetworkConfig
 from naisr_model.covariates import Population
 from naisr_model.errors import InputError
+from naisr_model.models.siren import SirenStack
 
 PointFunction = Callable[[Tensor], Tensor]
 """Of points ``[n, dim]`` in model units, on the device and in the precision of the model."""
@@ -35,11 +36,16 @@ class Linearised(NamedTuple):
         values: Phi, ``[shapes, n]``.
         slope: grad Phi with respect to the points, ``[shapes, n, dim]``.
         template_slope: grad T at the deformed points, ``[shapes, n, dim]``; None without a template.
+        displacement: d, ``[shapes, n, dim]``; None without a template.
+        underway: T where the points are after each of some earlier steps, ``[steps, shapes, n]``; None of a
+            model that takes none.
     """
 
     values: Tensor
     slope: Tensor
-    template_slope: Tensor | None
+    template_slope: Tensor | None = None
+    displacement: Tensor | None = None
+    underway: Tensor | None = None
 
 
 class ShapeModel(nn.Module, ABC):
@@ -93,6 +99,12 @@ class ShapeModel(nn.Module, ABC):
             latent: ``[L]``.
         """
 
+    @final
+    def hidden_layers(self) -> list[tuple[nn.Parameter, float]]:
+        """The matrices between hidden layers of sines, and omega0 of those sines."""
+        stacks = [part for part in self.modules() if isinstance(part, SirenStack)]
+        return [(stack.hidden_weight, stack.omega0) for stack in stacks]
+
     @abstractmethod
     def rated_parameters(self) -> dict[str, list[nn.Parameter]]:
         """All parameters, by the setting of ``TrainingConfig`` that is their learning rate."""
@@ -118,12 +130,16 @@ class DeformableModel(ShapeModel, ABC):
         return self.template(points + self.displacement(points, covariates, latents))
 
 
-class AdditiveModel(DeformableModel, ABC):
-    """d = sum_i g_i(p, c_i, z), and every g_i vanishes at c_i = 0."""
+class DisentangledModel(DeformableModel, ABC):
+    """Each covariate has a displacement g_i(p, c_i, z) of its own, which vanishes at c_i = 0."""
 
     @abstractmethod
     def displacements(self, points: Tensor, covariates: Tensor, latents: Tensor) -> Tensor:
         """All g_i, ``[N, shapes, n, dim]``; 0 to rounding where c_i = 0."""
+
+
+class AdditiveModel(DisentangledModel, ABC):
+    """d = sum_i g_i(p, c_i, z)."""
 
     @abstractmethod
     def effect_function(self, index: int, values: Tensor, latent: Tensor) -> PointFunction:
@@ -152,8 +168,22 @@ def deformable(model: ShapeModel) -> DeformableModel:
     raise InputError(f"{model.title} deforms no template, which this needs; ask for the shape itself")
 
 
-def additive(model: ShapeModel) -> AdditiveModel:
+def disentangled(model: ShapeModel) -> DisentangledModel:
     """``model``, known to give each covariate a displacement of its own.
+
+    Raises:
+        InputError: when it does not.
+    """
+    if isinstance(model, DisentangledModel):
+        return model
+    raise InputError(
+        f"{model.title} gives the covariates no displacements of their own, which this needs; "
+        "ask for the shape itself"
+    )
+
+
+def additive(model: ShapeModel) -> AdditiveModel:
+    """``model``, known to add up the displacements of its covariates.
 
     Raises:
         InputError: when it does not.
@@ -161,6 +191,6 @@ def additive(model: ShapeModel) -> AdditiveModel:
     if isinstance(model, AdditiveModel):
         return model
     raise InputError(
-        f"{model.title} gives the covariates no displacements of their own, which this needs; "
+        f"{disentangled(model).title} does not add up the displacements of the covariates, which this needs; "
         "ask for the shape itself"
     )

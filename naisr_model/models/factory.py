@@ -21,7 +21,10 @@ MODELS = MappingProxyType(
         "naisr": "naisr_model.models.naisr",
         "deepsdf": "naisr_model.models.deepsdf",
         "asdf": "naisr_model.models.asdf",
+        "dit": "naisr_model.models.dit",
+        "ndf": "naisr_model.models.ndf",
         "joint": "naisr_model.models.joint",
+        "invertible": "naisr_model.models.invertible",
     }
 )
 """Module of each model; importing this one imports none of them."""

@@ -60,7 +60,7 @@ class SingleNetwork(ShapeModel, ABC):
         """Phi and grad Phi."""
         values, slopes = self.network.traced(points, self.conditions(covariates, latents)[None])
         slope = self.network.pulled_back(torch.ones_like(values), slopes)[0]
-        return Linearised(values[0, :, :, 0], slope, None)
+        return Linearised(values[0, :, :, 0], slope)
 
     @final
     def shape_function(self, covariates: Tensor, latent: Tensor) -> PointFunction:
@@ -90,13 +90,14 @@ def presets(model: str, prior: float) -> dict[str, Preset]:
         prior: weight of the prior on the codes, in the demo.
     """
     training = TrainingConfig(
-        epochs=300,
+        epochs=100,
         batch_shapes=16,
         surface_points=64,
         near_points=32,
         uniform_points=32,
         template_rate=5e-4,
         latent_rate=3e-3,
+        hidden_rate=0.02,
         cosine=True,
         loss=LossWeights(latent=prior),
     )

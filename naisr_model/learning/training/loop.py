@@ -19,6 +19,7 @@ from naisr_model.learning.training.kept import held, keep_template, measured, re
 from naisr_model.learning.training.report import Log, Report
 from naisr_model.learning.training.step import accumulate_gradients
 from naisr_model.learning.training.task import State, Task, initial_state, make_task
+from naisr_model.models.devices import quick_products
 from naisr_model.progress import SILENT, Progress
 
 SAVE_SECONDS = 60.0
@@ -61,7 +62,7 @@ def train(
         Cancelled: when nobody waits for it any more; the state reached is kept.
     """
     task = make_task(store, preset, out, time_budget_s, device)
-    with held(task):
+    with held(task), quick_products(device):
         return _train(task, report, progress)
 
 
@@ -84,7 +85,8 @@ def _train(task: Task, report: Callable[[Report], None] | None, progress: Progre
                 saved = time.monotonic()
             if is_unwanted:
                 raise Cancelled
-            state.optimiser.step()
+            for optimiser in state.optimisers:
+                optimiser.step()
             state.iteration += 1
             keep_template(state, task)
             state.seconds += time.monotonic() - started

@@ -10,6 +10,18 @@ from torch import Tensor
 
 from naisr_model.surface.fields import LEAST_SLOPE
 
+TOLERANCES = 0.025, 0.01, 0.0025
+"""Model units by which the template may be wrong after each of the steps that are judged underway."""
+
+HARDNESS = 0.0, 0.1, 0.2
+"""By how much a point on the wrong side, or too near to it, counts for more there."""
+
+SHORT = 0.25
+"""Model units up to which the length of a displacement counts squared."""
+
+ALIKE = 0.5
+"""How much two displacements may differ, per distance of their points."""
+
 SMOOTHED_LENGTH = 1e-4
 """Model units below which a length is smoothed to a square, so that its gradient exists at 0."""
 
@@ -73,3 +85,38 @@ def ridge(displacements: Tensor) -> Tensor:
 def folding(determinant: Tensor) -> Tensor:
     """Mean of max(0, -det(I + grad d)): positive only where the deformation folds."""
     return torch.relu(-determinant).mean()
+
+
+def underway(predicted: Tensor, target: Tensor) -> Tensor:
+    """The curriculum of DIT (Zheng et al. 2021; Duan et al. 2020): every step has to be nearer than the last.
+
+    Args:
+        predicted: T after each of the steps that are judged, ``[steps, shapes, n]``.
+        target: signed distance s, ``[shapes, n]``.
+    """
+    wrong = (target - predicted).sign() * target.sign()
+    steps = zip(predicted, wrong, TOLERANCES, HARDNESS, strict=True)
+    return torch.stack(
+        [
+            (torch.relu((step - target).abs() - tolerance) * (1 + hardness * side)).mean()
+            for step, side, tolerance, hardness in steps
+        ]
+    ).mean()
+
+
+def pointwise(displacement: Tensor) -> Tensor:
+    """Mean Huber function of the displacements' lengths, from DIT; ``[..., n, dim]``."""
+    lengths = (displacement.square().sum(dim=-1) + SMOOTHED_LENGTH**2).sqrt()
+    return torch.nn.functional.huber_loss(lengths, torch.zeros_like(lengths), delta=SHORT)
+
+
+def pointpair(displacement: Tensor, points: Tensor) -> Tensor:
+    """Mean of max(0, |d_i - d_j| / |p_i - p_j| - 1/2), from DIT, over points that were drawn one by one.
+
+    Args:
+        displacement: d, ``[shapes, n, dim]``.
+        points: p, ``[shapes, n, dim]``.
+    """
+    apart, differing = (values - values.roll(1, dims=1) for values in (points, displacement))
+    differences = (differing.square().sum(dim=-1) + SMOOTHED_LENGTH**2).sqrt()
+    return torch.relu(differences / apart.norm(dim=-1).clamp(min=SMOOTHED_LENGTH) - ALIKE).mean()

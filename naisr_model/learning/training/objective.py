@@ -9,7 +9,7 @@ from torch import Tensor
 
 from naisr_model.config import LossWeights
 from naisr_model.learning.training import losses
-from naisr_model.models.base import ShapeModel, additive, deformable
+from naisr_model.models.base import ShapeModel, deformable, disentangled
 from naisr_model.models.derivatives import deformation_determinant
 
 
@@ -50,7 +50,7 @@ def reconstruction_terms(
     """
     on = batch.surface_points.shape[1]
     points = torch.cat([batch.surface_points, batch.space_points], dim=1)
-    values, slope, template_slope = model.linearised(points, covariates, latents)
+    values, slope, template_slope, displacement, underway = model.linearised(points, covariates, latents)
     terms = {
         "surface_distance": weights.surface_distance * losses.distance(values[:, :on], 0.0),
         "surface_normal": weights.surface_normal * losses.normal(slope[:, :on], batch.surface_normals),
@@ -62,16 +62,26 @@ def reconstruction_terms(
     if weights.space_eikonal:
         terms["space_eikonal"] = weights.space_eikonal * losses.eikonal(slope[:, on:])
     if weights.template_eikonal:
-        assert template_slope is not None  # no other model is trained with this term
+        assert template_slope is not None  # no other model is trained with this term, nor with those below
         terms["template_eikonal"] = weights.template_eikonal * losses.eikonal(template_slope)
     if weights.first_order:
         terms["first_order"] = weights.first_order * losses.first_order_distance(
             values[:, on:], slope[:, on:], batch.space_sdf, weights.first_order_reach
         )
+    if weights.underway:
+        assert underway is not None
+        distances = torch.cat([torch.zeros_like(values[:, :on]), batch.space_sdf], dim=1)
+        terms["underway"] = weights.underway * losses.underway(underway, distances)
+    if weights.pointwise:
+        assert displacement is not None
+        terms["pointwise"] = weights.pointwise * losses.pointwise(displacement)
+    if weights.pointpair:
+        assert displacement is not None
+        terms["pointpair"] = weights.pointpair * losses.pointpair(displacement, points)
     if weights.folding:
         located = batch.surface_points.requires_grad_()
-        displacement = deformable(model).displacement(located, covariates, latents)
-        determinant = deformation_determinant(displacement, located)
+        there = deformable(model).displacement(located, covariates, latents)
+        determinant = deformation_determinant(there, located)
         terms["folding"] = weights.folding * losses.folding(determinant)
     return terms
 
@@ -94,11 +104,11 @@ def population_terms(
     latents = covariates.new_zeros(len(covariates), model.config.latent)
     terms: dict[str, Tensor] = {}
     if weights.ridge:
-        displacements = additive(model).displacements(points, covariates, latents)
+        displacements = disentangled(model).displacements(points, covariates, latents)
         terms["ridge"] = weights.ridge * losses.ridge(displacements)
     if weights.centring and binary:
         levels = torch.cat([-torch.ones_like(covariates), torch.ones_like(covariates)])
-        both = additive(model).displacements(points.repeat(2, 1, 1), levels, latents.repeat(2, 1))
+        both = disentangled(model).displacements(points.repeat(2, 1, 1), levels, latents.repeat(2, 1))
         terms["centring"] = weights.centring * losses.centring(*both[list(binary)].chunk(2, dim=1))
     return terms
 

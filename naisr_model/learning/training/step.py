@@ -15,8 +15,11 @@ from naisr_model.learning.training.residual import residual_latents
 from naisr_model.learning.training.task import State, Task
 from naisr_model.models.base import ShapeModel
 
-POINTS_AT_ONCE = 1024
-"""Points whose activations are alive together: they stay in the cache, twice as fast on a CPU."""
+CACHED_POINTS = 1024
+"""Points whose activations stay in a processor's cache together, twice as fast as many more."""
+
+HELD_POINTS = 16_384
+"""Points that keep a graphics card busy, with some GB of activations at the paper's size."""
 
 POPULATION_SHAPES = 4
 """Shapes of a batch at whose points the effects are held in place."""
@@ -26,7 +29,8 @@ def accumulate_gradients(state: State, task: Task) -> dict[str, float]:
     """Forward and backward through the batch of this iteration; the weighted terms and their total."""
     config, chosen = task.config, _chosen(task, state.iteration)
     _set_rates(state, config, state.share(task))
-    state.optimiser.zero_grad()
+    for optimiser in state.optimisers:
+        optimiser.zero_grad()
     batch, covariates = _draw(task, chosen, state.iteration), task.covariates[chosen]
     codes = residual_latents(state.codes, task.basis)[chosen]
     if state.share(task) < config.population_share:
@@ -60,7 +64,8 @@ def accumulate_reconstruction(
     """
     shapes, count = batch.surface_points.shape[0], batch.surface_points.shape[1] + batch.space_sdf.shape[1]
     sums: dict[str, float] = {}
-    shapes_at_once = max(1, POINTS_AT_ONCE // count)
+    at_once = CACHED_POINTS if latents.device.type == "cpu" else HELD_POINTS
+    shapes_at_once = max(1, at_once // count)
     for start in range(0, shapes, shapes_at_once):
         part = slice(start, min(start + shapes_at_once, shapes))
         terms = reconstruction_terms(model, batch.narrow(part), covariates[part], latents[part], weights)
@@ -93,5 +98,6 @@ def _draw(task: Task, chosen: NDArray[np.intp], iteration: int) -> Batch:
 
 def _set_rates(state: State, config: TrainingConfig, share: float) -> None:
     factor = 0.5 * (1 + math.cos(math.pi * share)) if config.cosine else 1.0
-    for group in state.optimiser.param_groups:
-        group["lr"] = getattr(config, group["setting"]) * factor
+    for optimiser in state.optimisers:
+        for group in optimiser.param_groups:
+            group["lr"] = getattr(config, group["setting"]) * group["part"] * factor

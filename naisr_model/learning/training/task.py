@@ -18,10 +18,14 @@ from torch import Tensor, nn
 from naisr_model.config import Preset, TrainingConfig, require_ranges
 from naisr_model.data.store import SampleStore
 from naisr_model.errors import InputError
+from naisr_model.learning.training.muon import Muon
 from naisr_model.learning.training.residual import covariate_basis
 from naisr_model.models.base import ShapeModel
 from naisr_model.models.devices import usable_device
 from naisr_model.models.factory import build, layout, model_class
+
+MOMENTS = {torch.optim.Adam: ("exp_avg", "exp_avg_sq"), Muon: ("momentum",)}
+"""What each optimiser remembers of a parameter, in its shape."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +86,8 @@ class State:
     Attributes:
         model: in training.
         codes: of the training shapes before anything is taken out of them, ``[n, L]``.
-        optimiser: of both; each of its groups names the setting that is its learning rate.
+        optimisers: of both; each of their groups names the setting that is its learning rate, and what part
+            of it.
         iteration: iterations done.
         seconds: spent on them, earlier runs included.
         running: mean of the loss of late.
@@ -91,7 +96,7 @@ class State:
 
     model: ShapeModel
     codes: nn.Parameter
-    optimiser: torch.optim.Adam
+    optimisers: tuple[torch.optim.Optimizer, ...]
     iteration: int = 0
     seconds: float = 0.0
     running: float = math.inf
@@ -103,7 +108,7 @@ class State:
         return numbers | {
             "network": self.model.state_dict(),
             "codes": self.codes.detach(),
-            "optimiser": self.optimiser.state_dict(),
+            "optimisers": [optimiser.state_dict() for optimiser in self.optimisers],
         }
 
     def load(self, record: dict[str, Any]) -> None:
@@ -114,17 +119,20 @@ class State:
         """
         if not isinstance(record["iteration"], int) or record["iteration"] < 0:
             raise ValueError(f"{shortened(record['iteration'])} iterations")
-        moments, groups = record["optimiser"]["state"], self.optimiser.state_dict()["param_groups"]
-        parameters = [parameter for group in self.optimiser.param_groups for parameter in group["params"]]
-        for number, own in moments.items():
-            _require_like(own["exp_avg"], parameters[number])
-            _require_like(own["exp_avg_sq"], parameters[number])
+        moments = [kept["state"] for kept in record["optimisers"]]
+        for optimiser, known in zip(self.optimisers, moments, strict=True):
+            parameters = [parameter for group in optimiser.param_groups for parameter in group["params"]]
+            for number, own in known.items():
+                for name in MOMENTS[type(optimiser)]:
+                    _require_like(own[name], parameters[number])
         for name, weight in self.model.state_dict().items():
             _require_like(record["network"][name], weight)
         _require_like(record["codes"], self.codes)
         self.model.load_state_dict(record["network"])
         self.codes.data.copy_(record["codes"])
-        self.optimiser.load_state_dict({"state": moments, "param_groups": groups})
+        for optimiser, known in zip(self.optimisers, moments, strict=True):
+            groups = optimiser.state_dict()["param_groups"]
+            optimiser.load_state_dict({"state": known, "param_groups": groups})
         for name in ("iteration", "seconds", "running", "best"):
             value = record[name]
             if (
@@ -198,8 +206,11 @@ def _check(preset: Preset) -> None:
         ("displacement_rate", given.displacement_rate, neutral.displacement_rate, can.deformable),
         ("loss.template_eikonal", loss.template_eikonal, none.template_eikonal, can.has_template),
         ("loss.folding", loss.folding, none.folding, can.deformable),
-        ("loss.centring", loss.centring, none.centring, can.trackable),
-        ("loss.ridge", loss.ridge, none.ridge, can.trackable),
+        ("loss.underway", loss.underway, none.underway, can.stepwise),
+        ("loss.pointwise", loss.pointwise, none.pointwise, can.deformable),
+        ("loss.pointpair", loss.pointpair, none.pointpair, can.deformable),
+        ("loss.centring", loss.centring, none.centring, can.deformable and can.disentangleable),
+        ("loss.ridge", loss.ridge, none.ridge, can.deformable and can.disentangleable),
     )
     for name, value, untouched, is_possible in settings:
         if value != untouched and not is_possible:
@@ -216,6 +227,24 @@ def initial_state(task: Task) -> State:
         model = build(task.preset, len(task.store.population.covariates)).to(device)
         codes = torch.randn(len(task.rows), network.latent) * config.loss.latent_sigma
     parameter = nn.Parameter(codes.to(device))
-    rated = model.rated_parameters() | {"latent_rate": [parameter]}
-    optimiser = torch.optim.Adam([{"params": own, "setting": name} for name, own in rated.items()])
-    return State(model, parameter, optimiser)
+    return State(model, parameter, _optimisers(model, parameter, config))
+
+
+def _optimisers(
+    model: ShapeModel, codes: nn.Parameter, config: TrainingConfig
+) -> tuple[torch.optim.Optimizer, ...]:
+    """Adam for everything, or for all but the matrices between hidden layers."""
+    layers = model.hidden_layers() if config.hidden_rate else []
+    taken = {id(matrices) for matrices, _ in layers}
+    rated = model.rated_parameters() | {"latent_rate": [codes]}
+    groups = [
+        {"params": [one for one in own if id(one) not in taken], "setting": name, "part": 1.0}
+        for name, own in rated.items()
+    ]
+    adam = torch.optim.Adam(groups)
+    if not layers:
+        return (adam,)
+    parts = [
+        {"params": [matrices], "setting": "hidden_rate", "part": 1 / omega0} for matrices, omega0 in layers
+    ]
+    return adam, Muon(parts)

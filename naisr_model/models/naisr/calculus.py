@@ -12,7 +12,7 @@ from naisr_model.models.siren import SirenStack
 def linearised(
     template: SirenStack, displacements: SirenStack, points: Tensor, conditions: Tensor
 ) -> Linearised:
-    """Phi and grad Phi = (I + grad d)^T grad T at p + d(p).
+    """Phi, grad Phi = (I + grad d)^T grad T at p + d(p), and d.
 
     A loss of these needs one backward pass, not one through the graph of another.
 
@@ -25,12 +25,13 @@ def linearised(
     shapes = len(points)
     at_both, bends = displacements.traced(points.repeat(2, 1, 1), conditions)
     at_value, at_zero = at_both.split(shapes, dim=1)
-    values, slopes = template.traced(points + (at_value - at_zero).sum(dim=0))
+    displacement = (at_value - at_zero).sum(dim=0)
+    values, slopes = template.traced(points + displacement)
     template_slope = template.pulled_back(torch.ones_like(values), slopes)[0]
     outer = torch.cat([template_slope, -template_slope]).expand(len(conditions), -1, -1, -1)
     bent = displacements.pulled_back(outer, bends).sum(dim=0)
     slope = template_slope + bent[:shapes] + bent[shapes:]
-    return Linearised(values[0, :, :, 0], slope, template_slope)
+    return Linearised(values[0, :, :, 0], slope, template_slope, displacement)
 
 
 def conditions(covariates: Tensor, latents: Tensor) -> Tensor:

@@ -45,6 +45,7 @@ class Naisr(AdditiveModel):
     capabilities: ClassVar[Capabilities] = Capabilities(
         deformable=True,
         disentangleable=True,
+        additive=True,
         evolvable=True,
         transferable=True,
         has_template=True,

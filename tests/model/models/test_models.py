@@ -10,7 +10,15 @@ import torch
 from naisr_model.config import Preset, TrainingConfig
 from naisr_model.errors import InputError
 from naisr_model.models import factory
-from naisr_model.models.base import AdditiveModel, DeformableModel, ShapeModel, additive, deformable
+from naisr_model.models.base import (
+    AdditiveModel,
+    DeformableModel,
+    DisentangledModel,
+    ShapeModel,
+    additive,
+    deformable,
+    disentangled,
+)
 from naisr_model.models.derivatives import gradient
 from naisr_model.models.factory import MODELS, build, model_class, preset, presets, read_preset
 
@@ -88,7 +96,8 @@ def test_every_weight_has_one_learning_rate(model):
 def test_capabilities_say_what_the_class_is(model):
     can = model.capabilities
     assert isinstance(model, DeformableModel) == can.deformable == can.has_template
-    assert isinstance(model, AdditiveModel) == can.trackable
+    assert isinstance(model, DisentangledModel) == (can.deformable and can.disentangleable)
+    assert isinstance(model, AdditiveModel) == can.additive == can.trackable
     assert can.trackable <= can.evolvable
     assert can.transferable <= can.evolvable
     assert can.vanishes_at_centre <= can.has_template
@@ -103,9 +112,13 @@ def test_the_shape_at_the_centre_is_the_template_where_displacements_vanish(mode
 
 def test_what_a_model_is_not_is_refused_in_its_name():
     bare = build(preset("deepsdf-demo"), COVARIATES)
-    for needed in (deformable, additive):
+    for needed in (deformable, disentangled, additive):
         with pytest.raises(InputError, match=r"DeepSDF .*; ask for the shape itself"):
             needed(bare)
+    flowing = build(preset("invertible-demo"), COVARIATES)
+    with pytest.raises(InputError, match="NAISR, invertible does not add up the displacements"):
+        additive(flowing)
+    assert disentangled(flowing) is flowing
     whole = build(preset("demo"), COVARIATES)
     assert deformable(whole) is whole and additive(whole) is whole
 
@@ -133,7 +146,7 @@ def test_a_record_that_names_no_model_is_naisr_s():
 
 def test_unknown_models_and_presets_are_named():
     with pytest.raises(
-        InputError, match=r"unknown shape model 'cubes'; known are asdf, deepsdf, joint, naisr"
+        InputError, match=r"unknown shape model 'cubes'; known are asdf, deepsdf, dit, invertible, joint"
     ):
         model_class("cubes")
     with pytest.raises(InputError, match=r"no preset 'huge'; choose one of .*demo.*deepsdf-demo"):

@@ -11,6 +11,7 @@ from naisr_viewer.engine.engine import Engine
 from naisr_viewer.panels.kinds import all_panels, visible_panels
 from naisr_viewer.program.headless import finish, run_demo
 from naisr_viewer.state.layouts import FULL_SHAPE, TEMPLATE, Layout
+from naisr_viewer.state.requests import Panel
 
 TOLERATED = 0.06
 """Share of a volume by which a code that was trained for some seconds may be off."""
@@ -82,7 +83,7 @@ def test_a_setting_of_a_covariate_is_refused_in_words(egg_deepsdf, capsys):
     assert "depend on no covariates" in capsys.readouterr().err
 
 
-@pytest.fixture(params=["egg_asdf", "egg_joint"])
+@pytest.fixture(params=["egg_asdf", "egg_joint", "egg_invertible"])
 def with_covariates(request, whole_window, tmp_path):
     window, controller = whole_window(Engine(folder=tmp_path / "cache"))
     controller.open(request.getfixturevalue(request.param))
@@ -94,7 +95,8 @@ def test_covariates_that_are_not_told_apart_have_sliders_and_one_shape(with_cova
     window, controller = with_covariates
     assert list(window.covariates.rows) == ["age", "sex"]
     can = controller.state.atlas.capabilities
-    assert visible_panels(controller.state) == ((TEMPLATE, FULL_SHAPE) if can.has_template else (FULL_SHAPE,))
+    alone = (Panel("effect", "age"), Panel("effect", "sex")) if can.disentangleable else ()
+    assert visible_panels(controller.state) == (*([TEMPLATE] if can.has_template else []), *alone, FULL_SHAPE)
     assert ("Side by side" in offered(window)) == can.has_template
     assert "Reset all covariates" in offered(window)
     sex = dict(controller.state.named)["sex"]

@@ -54,6 +54,27 @@ def test_folding_counts_only_negative_determinants():
     assert losses.folding(torch.tensor([1.0, 0.2, -0.6])) == pytest.approx(0.2)
 
 
+def test_steps_underway_may_be_wrong_by_less_and_less():
+    target = torch.tensor([[0.1, -0.1]])
+    assert losses.underway(torch.stack([target + 0.02, target + 0.009, target - 0.002]), target) == 0
+    outwards = torch.tensor([[0.125, -0.1]])  # farther outside than the first point is: the easy side
+    inwards = torch.tensor([[0.075, -0.1]])  # nearer to the surface, or through it: the hard side
+    easy, hard = (losses.underway(torch.stack([one] * 3), target) for one in (outwards, inwards))
+    beyond = [0.0, 0.015 / 2, 0.0225 / 2]
+    assert easy == pytest.approx((beyond[1] * 0.9 + beyond[2] * 0.8) / 3, rel=1e-5)
+    assert hard == pytest.approx((beyond[1] * 1.1 + beyond[2] * 1.2) / 3, rel=1e-5)
+
+
+def test_a_shift_of_everything_is_long_but_alike_and_a_stretch_is_not():
+    points = torch.randn(2, 40, 3, dtype=torch.float64)
+    shift = torch.tensor([0.06, 0.0, 0.08], dtype=torch.float64).expand_as(points)
+    assert losses.pointwise(shift) == pytest.approx(0.1**2 / 2, rel=1e-5)
+    assert losses.pointwise(10 * shift) == pytest.approx(0.25 * (1 - 0.125), rel=1e-5)
+    assert losses.pointpair(shift, points) == 0
+    assert losses.pointpair(0.4 * points, points) == 0
+    assert losses.pointpair(0.8 * points, points) == pytest.approx(0.3, rel=1e-5)
+
+
 def test_population_terms_push_the_template_to_the_middle_of_the_levels():
     config = NaisrConfig(latent=2, template=SirenConfig(8, 1, 5.0), displacement=SirenConfig(8, 1, 3.0))
     torch.manual_seed(0)

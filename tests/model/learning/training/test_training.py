@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from eggs import egg, egg_preset
+from eggs import egg, egg_preset, egg_warping_preset
 
 from naisr_model.atlas import Atlas
 from naisr_model.checkpoint import load
@@ -24,6 +24,7 @@ from naisr_model.learning.training import loop as training
 from naisr_model.learning.training import step
 from naisr_model.learning.training.loop import train
 from naisr_model.learning.training.objective import Batch
+from naisr_model.learning.training.report import Report
 from naisr_model.models.factory import preset as named
 from naisr_model.progress import Progress
 
@@ -46,10 +47,10 @@ def test_the_effects_are_those_of_the_population(egg_atlas):
 
 def test_the_checkpoint_tells_how_it_was_trained(egg_atlas):
     record = load(egg_atlas).training
-    assert record["iterations"] == 600
+    assert record["iterations"] == 200
     assert record["folded_share"] < 0.01
     templates = sorted((egg_atlas.parent / (egg_atlas.name + ".training") / "templates").iterdir())
-    assert [path.name for path in templates][-1] == "epoch_00100.ply"
+    assert [path.name for path in templates][-1] == "epoch_00050.ply"
 
 
 def same(first, second):
@@ -84,6 +85,44 @@ def test_a_killed_training_ends_like_one_that_was_not(egg_store, tmp_path):
     assert subprocess.run(command, env=environment, check=False).returncode == -signal.SIGKILL
     assert load(out).training["iterations"] in (6, 7)
     assert same(train(egg_store, preset, out), whole)
+
+
+@pytest.mark.parametrize("rate", [0.0, 0.02])
+def test_the_hidden_layers_learn_by_either_rule(egg_store, tmp_path, rate):
+    plain = egg_preset(epochs=6)
+    preset = dataclasses.replace(plain, training=dataclasses.replace(plain.training, hidden_rate=rate))
+    seen: list[Report] = []
+    train(egg_store, preset, tmp_path / "a.safetensors", report=seen.append)
+    assert seen[-1].losses["total"] < 0.6 * seen[0].losses["total"]
+    other = dataclasses.replace(preset, training=dataclasses.replace(preset.training, hidden_rate=0.1))
+    with pytest.raises(InputError, match="a training with other settings"):
+        train(egg_store, other, tmp_path / "a.safetensors")
+
+
+@pytest.mark.parametrize("model", ["dit", "ndf", "invertible"])
+def test_models_that_move_points_in_their_own_way_learn(egg_store, tmp_path, model):
+    given = egg_warping_preset(model, epochs=2)
+    few = {"batch_shapes": 7, "surface_points": 16, "near_points": 8, "uniform_points": 8}
+    training = dataclasses.replace(given.training, **few, population_share=0.0)
+    seen: list[dict[str, float]] = []
+    preset, out = dataclasses.replace(given, training=training), tmp_path / "a.safetensors"
+    train(egg_store, preset, out, report=lambda told: seen.append(told.losses))
+    assert seen[-1]["total"] < 0.8 * seen[0]["total"]
+    own = {"dit": {"underway", "pointwise", "pointpair"}, "ndf": {"pointwise", "pointpair"}}
+    assert own.get(model, {"ridge", "centring"}) <= set(seen[0])
+    assert load(out).training["folded_share"] == 0
+
+
+@pytest.mark.parametrize(
+    ("model", "term"),
+    [("naisr", "underway"), ("deepsdf", "pointwise"), ("asdf", "pointpair"), ("dit", "ridge")],
+)
+def test_a_term_that_a_model_has_no_use_for_is_refused(egg_store, tmp_path, model, term):
+    plain = named("demo" if model == "naisr" else f"{model}-demo")
+    loss = dataclasses.replace(plain.training.loss, **{term: 1.0})
+    preset = dataclasses.replace(plain, training=dataclasses.replace(plain.training, loss=loss))
+    with pytest.raises(InputError, match=f"'training.loss.{term}' is 1.0, but .* has no use for it; leave"):
+        train(egg_store, preset, tmp_path / "a.safetensors")
 
 
 def test_a_stopped_training_keeps_what_it_reached(egg_store, tmp_path):
@@ -274,8 +313,9 @@ def with_nan(tensor):
         lambda state: state | {"codes": with_nan(state["codes"])},
         lambda state: state | {"network": {name: with_nan(one) for name, one in state["network"].items()}},
         lambda state: state | {"network": {}},
-        lambda state: state | {"optimiser": {"state": {0: {"exp_avg": torch.zeros(2)}}}},
-        lambda state: state | {"optimiser": {"state": {99: state["optimiser"]["state"][0]}}},
+        lambda state: state | {"optimisers": [{"state": {0: {"exp_avg": torch.zeros(2)}}}]},
+        lambda state: state | {"optimisers": [{"state": {99: state["optimisers"][0]["state"][0]}}]},
+        lambda state: state | {"optimisers": state["optimisers"] * 2},
         lambda state: {name: value for name, value in state.items() if name != "fingerprint"},
         lambda state: [1, 2],
     ],
