@@ -198,7 +198,7 @@ class Controller(QObject):
         before = self._before_move or self.state
         self._before_move = None
         self._window.shapes.set_moving(False)
-        self._conclude(before, self._moved(before, values))
+        self.conclude(before, self._moved(before, values))
 
     def reset(self, name: str) -> None:
         """One covariate to the patient's value, or to the population mean."""
@@ -275,7 +275,13 @@ class Controller(QObject):
     def commit(self, state: ExplorerState) -> None:
         """Make ``state`` the present one, as one step to undo."""
         self._finish_move()
-        self._conclude(self.state, with_layout_of(state))
+        self.conclude(self.state, with_layout_of(state))
+
+    def conclude(self, before: ExplorerState, after: ExplorerState) -> None:
+        """Make ``after`` the present state, one step to undo since ``before``."""
+        self._timeline.record(before, after)
+        self.go(after)
+        self._timeline.release(after)
 
     def go(self, state: ExplorerState) -> None:
         """Make ``state`` the present one, in a layout that its atlas has; nothing is remembered."""
@@ -333,11 +339,6 @@ class Controller(QObject):
 
     def _see(self, overlay: Overlay) -> None:
         self.go(replace(self.state, overlay=overlay))
-
-    def _conclude(self, before: ExplorerState, after: ExplorerState) -> None:
-        self._timeline.record(before, after)
-        self.go(after)
-        self._timeline.release(after)
 
     def _consider_closing(self, event: QCloseEvent) -> None:
         """Keep the window open where what would be lost is dear to its user."""

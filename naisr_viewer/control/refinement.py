@@ -44,6 +44,7 @@ class Refinement(QObject):
         worker: runs the engine beside the window.
     """
 
+    surface_shown = Signal(object)  # a SurfaceResult that has just come on screen
     settled = Signal()  # everything on screen is exact, or the computation ended otherwise
     rested = Signal()  # as settled, and nobody had anything else to do
 
@@ -174,6 +175,7 @@ class Refinement(QObject):
         self.shown[panel] = result
         self._window.shapes.show_surface(result)
         self._window.shapes.set_caption(panel, *caption_of(self._state, result))
+        self.surface_shown.emit(result)
 
     def _progressed(self, fraction: float) -> None:
         if not self._patience.isActive() and self._task is not Task.PREVIEW:

@@ -19,6 +19,7 @@ from naisr_viewer import __version__
 from naisr_viewer.state.camera import Camera
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.overlay import Overlay
+from naisr_viewer.state.section import Section
 from naisr_viewer.state.session import Session
 
 FORMAT, VERSION = "NAISR session", 1
@@ -101,6 +102,8 @@ def _converter(folder: Path) -> Converter:
     converter.register_structure_hook(Camera, lambda value, kind: _sound_camera(as_camera(value, kind)))
     as_overlay = make_dict_structure_fn(Overlay, converter)
     converter.register_structure_hook(Overlay, lambda value, kind: _sound_overlay(as_overlay(value, kind)))
+    as_section = make_dict_structure_fn(Section, converter)
+    converter.register_structure_hook(Section, lambda value, kind: _sound_section(as_section(value, kind)))
     absent: dict[str, Any] = dict.fromkeys(BESIDE, override(omit=True))
     as_state = make_dict_structure_fn(ExplorerState, converter, **absent)
     converter.register_structure_hook(ExplorerState, lambda value, kind: as_state(_record_of(value), kind))
@@ -141,6 +144,12 @@ def _sound_overlay(overlay: Overlay) -> Overlay:
     if not all(limit > 0 for _, limit in overlay.limits):
         raise ValueError("a colour scale ends beyond 0")
     return overlay
+
+
+def _sound_section(section: Section) -> Section:
+    if abs(np.linalg.norm(section.normal) - 1) > ALONG_UP:
+        raise ValueError("the normal of a plane has the length 1")
+    return section
 
 
 def _record_of(value: object) -> dict[str, Any]:

@@ -117,6 +117,7 @@ def make_window(
     from naisr_viewer.control.pinning import PinDesk
     from naisr_viewer.control.playing import Player
     from naisr_viewer.control.preferences import Preferences
+    from naisr_viewer.control.section import SectionDesk
     from naisr_viewer.control.sessions import SessionDesk
     from naisr_viewer.control.worker import Worker
     from naisr_viewer.engine.clinic import Clinic
@@ -137,6 +138,7 @@ def make_window(
     SessionDesk(window, controller, engine, clinic, Worker(), Worker(), kept)  # and this
     MatrixDesk(window, controller, engine)  # and this
     Player(window, controller)  # and this
+    SectionDesk(window, controller)  # and this
     return window, controller
 
 

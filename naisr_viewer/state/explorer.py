@@ -15,6 +15,7 @@ from naisr_viewer.state.matrix import Matrix, first_matrix, values_at
 from naisr_viewer.state.overlay import NOTHING_SHOWN, Overlay
 from naisr_viewer.state.patients import Fitted, Named, OpenScan
 from naisr_viewer.state.pins import Pin, Point, with_pin
+from naisr_viewer.state.section import Section
 from naisr_viewer.state.support import NOTHING_CHOSEN, Support, suited
 
 AVERAGE_KEY = 0
@@ -37,6 +38,7 @@ class ExplorerState:
         has_ghost: whether the scan is drawn over the full shape.
         pins: places that are marked in all shapes, and told of.
         matrix: what shapes are laid out by in that layout; None where there are no two covariates.
+        section: the plane that all shapes are cut by; None where they are whole.
         overlay: what the surfaces are coloured by.
         muted: covariates that are left out of the full shape.
         touched: the covariate that was moved last; empty before.
@@ -57,6 +59,7 @@ class ExplorerState:
     has_ghost: bool = True
     pins: tuple[Pin, ...] = ()
     matrix: Matrix | None = None
+    section: Section | None = None
     overlay: Overlay = NOTHING_SHOWN
     muted: tuple[str, ...] = ()
     touched: str = ""

@@ -64,7 +64,7 @@ def persons(history: History, now: ExplorerState) -> frozenset[int]:
 
 def _work(state: ExplorerState) -> object:
     """What undo brings back; how it is looked at is not work."""
-    return state.values, state.patients, state.patient, state.compared, state.pins
+    return state.values, state.patients, state.patient, state.compared, state.pins, state.section
 
 
 def _with_work(now: ExplorerState, wanted: ExplorerState, left: ExplorerState) -> ExplorerState:
@@ -78,6 +78,7 @@ def _with_work(now: ExplorerState, wanted: ExplorerState, left: ExplorerState) -
             patient=wanted.patient,
             compared=wanted.compared,
             pins=wanted.pins,
+            section=wanted.section,
             layout=layout,
         )
     )

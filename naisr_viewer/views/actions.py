@@ -48,6 +48,7 @@ class Window(Protocol):
     redo_requested: SignalInstance
     layout_requested: SignalInstance
     theme_requested: SignalInstance
+    section_switched: SignalInstance
     unpin_requested: SignalInstance
     play_requested: SignalInstance
     drawer_requested: SignalInstance
@@ -247,7 +248,7 @@ COMMANDS = (
         "Undo",
         lambda window: window.undo_requested.emit(),
         keys=("Ctrl+Z",),
-        tip="Undo the last act: a covariate moved, a scan opened, read, fitted, compared or closed",
+        tip="Undo the last act: a covariate or the section plane moved, a scan opened, read, fitted, compared or closed",
         needs=frozenset({Fact.REST, Fact.PAST}),
     ),
     Command(
@@ -304,6 +305,15 @@ COMMANDS = (
         offered=lambda atlas: bool(atlas.covariates),
     ),
     Command(
+        "section",
+        "Section plane",
+        lambda window: window.section_switched.emit(),
+        keys=("Ctrl+K",),
+        tip="Cut all shapes by one plane; again to have them whole",
+        needs=AT_REST,
+        is_switch=True,
+    ),
+    Command(
         "reset camera",
         "Reset camera",
         lambda window: window.shapes.reset_camera(),
@@ -337,7 +347,7 @@ MENUS = {
     "&Edit": ("undo", "redo", "reset all", "unpin", SEPARATOR, "preferences"),
     "&View": (
         *_names(LAYOUTS), "patients", *_names(DRAWER), SEPARATOR,
-        "play", SEPARATOR, "reset camera", *_names(LOOKS), SEPARATOR, *_names(THEMES),
+        "play", "section", SEPARATOR, "reset camera", *_names(LOOKS), SEPARATOR, *_names(THEMES),
     ),
     "&Help": (*_names(DOCUMENTS), SEPARATOR, "about"),
 }  # fmt: skip

@@ -14,6 +14,7 @@ from naisr_viewer.views.error_bar import ErrorBar
 from naisr_viewer.views.ledger import LedgerPage
 from naisr_viewer.views.map_bar import MapBar
 from naisr_viewer.views.matrix_bar import MatrixBar
+from naisr_viewer.views.section_bar import SectionBar
 
 FULL_WIDTH_PX = 540
 """A narrower window takes from the panels as well as from the shapes."""
@@ -34,6 +35,7 @@ class Centre(QWidget):
         self.empty = EmptyPage(self)
         self.maps = MapBar(self)
         self.matrix = MatrixBar(self)
+        self.section = SectionBar(self)
         self.ledger = LedgerPage(self)
         self.curve = CurvePage(self)
         self.drawer = Drawer({Tab.POINT: self.ledger, Tab.CURVE: self.curve}, self)
@@ -47,6 +49,7 @@ class Centre(QWidget):
         column.addWidget(self.empty, 1)
         column.addWidget(self.maps)
         column.addWidget(self.matrix)
+        column.addWidget(self.section)
         column.addWidget(shapes, 1)
         column.addWidget(self.drawer)
         self.show_shapes(False)
@@ -58,7 +61,7 @@ class Centre(QWidget):
     @property
     def stops(self) -> list[QWidget]:
         """What the Tab key goes through, as it is read."""
-        bars = [*self.maps.stops, *self.matrix.stops]
+        bars = [*self.maps.stops, *self.matrix.stops, *self.section.stops]
         return [*self.errors.stops, *self.changed.stops, self.empty.button, *bars]
 
     @property

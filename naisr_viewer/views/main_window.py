@@ -23,6 +23,7 @@ from naisr_viewer.state.layouts import Layout, Panel
 from naisr_viewer.state.patients import Labels
 from naisr_viewer.state.pins import Ledger
 from naisr_viewer.state.questions import Answer, Question
+from naisr_viewer.state.section import Section
 from naisr_viewer.state.theme import ThemeChoice
 from naisr_viewer.views.actions import (
     COMMANDS,
@@ -98,6 +99,11 @@ class MainWindow(QMainWindow):
     matrix_requested = Signal(object)  # a Matrix from the boxes above its cells
     quantity_chosen = Signal(object)  # a Quantity that the surfaces shall be coloured by
     shared_toggled = Signal(bool)  # whether all surfaces with numbers of one unit share its scale
+    section_switched = Signal()  # View > Section plane
+    section_chosen = Signal(object)  # a Plane from the box above the shapes
+    section_moved = Signal(float)  # where the section plane is dragged to, mm along its normal
+    section_settled = Signal(float)  # where it came to rest
+    section_flipped = Signal()  # the other side of it shall be shown
     unpin_requested = Signal()  # Edit > Remove pins
     play_requested = Signal()  # View > Play: whether it plays is for who moves the covariate to say
     pin_removal_requested = Signal(int)  # number of a pin whose cross was clicked
@@ -162,6 +168,8 @@ class MainWindow(QMainWindow):
         if len(state.patients) > len(old.patients):
             self._actions["patients"].setChecked(True)
         self.show_sides()
+        self._centre.section.show_section(state.section)
+        self._actions["section"].setChecked(state.section is not None)
         self._show_maps(state)
         self._show_panels(state)
         self._show_ghost(state)
@@ -207,6 +215,11 @@ class MainWindow(QMainWindow):
         """What the Tab key goes through, as it is read: the panels from left to right, then what is below."""
         shapes = [*self._centre.stops, self.shapes.row_bar, *self._centre.drawer_stops]
         return [*self.covariates.stops, *shapes, *self.patients.stops, self.cancel]
+
+    def show_reach(self, section: Section, low_mm: float, high_mm: float) -> None:
+        """Say between which offsets the section plane has something to cut."""
+        self._centre.section.show_reach(low_mm, high_mm)
+        self._centre.section.show_section(section)
 
     def show_history(self, can_undo: bool, can_redo: bool) -> None:
         """Enable what can be undone and redone."""
@@ -265,6 +278,7 @@ class MainWindow(QMainWindow):
         self.shapes.set_theme(theme)
         self._centre.ledger.set_theme(theme)
         self._centre.curve.set_theme(theme)
+        self._centre.section.set_theme(theme)
         self.scale.update()
         self._actions[f"theme {choice}"].setChecked(True)
 
@@ -441,6 +455,7 @@ class MainWindow(QMainWindow):
         self._centre.ledger.removal_requested.connect(self.pin_removal_requested)
         self._centre.matrix.changed.connect(self.matrix_requested)
         self._connect_curve()
+        self._connect_section()
         self.patients.open_requested.connect(self.ask_scan)
         self.cancel.clicked.connect(self.cancel_requested)
         self.shapes.scale_changed.connect(self.scale.set_scale)
@@ -457,6 +472,13 @@ class MainWindow(QMainWindow):
         curve.value_settled.connect(self.covariates.value_settled)
         curve.save_requested.connect(self._ask_curve_place)
         curve.reckoning_requested.connect(self.reckoning_requested)
+
+    def _connect_section(self) -> None:
+        bar = self._centre.section
+        bar.plane_chosen.connect(self.section_chosen)
+        bar.offset_moved.connect(self.section_moved)
+        bar.offset_settled.connect(self.section_settled)
+        bar.flip_requested.connect(self.section_flipped)
 
     def _show_readout(self, panel: Panel, hit: Hit) -> None:
         """What the mouse rests over."""

@@ -83,6 +83,10 @@ def style_sheet(theme: Theme) -> str:
     #mapBar QToolButton:hover, #mapBar QToolButton:focus {{ border-color: {t.accent}; }}
     #mapBar QToolButton:checked {{ background: {t.accent}; color: {t.on_accent}; border-color: {t.accent}; }}
     #mapBar QToolButton:checked:focus {{ border-color: {t.text}; }}
+    #sectionBar {{ background: {t.window}; border-bottom: 1px solid {t.line}; }}
+    #sectionBar QToolButton {{ border: 1px solid {t.line}; padding: 2px 8px; background: {t.raised};
+                color: {t.text}; }}
+    #sectionBar QToolButton:hover, #sectionBar QToolButton:focus {{ border-color: {t.accent}; }}
     #drawer {{ background: {t.window}; border-top: 1px solid {t.line}; }}
     #drawer QToolButton {{ border: 1px solid transparent; border-radius: 4px; padding: 1px 6px;
                 color: {t.muted}; background: transparent; }}

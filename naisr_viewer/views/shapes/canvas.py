@@ -13,10 +13,11 @@ from PySide6.QtWidgets import QWidget
 from pyvistaqt import QtInteractor
 
 from naisr_viewer.state.requests import SurfaceResult
+from naisr_viewer.state.section import Cut, Section
 from naisr_viewer.views.colours import PALENESS, blend
 from naisr_viewer.views.shapes.arrangement import Viewport
 from naisr_viewer.views.shapes.camera import Direction, aim, is_any_seen, seen_size
-from naisr_viewer.views.shapes.looks import POINT_PX, as_ghost, as_marks
+from naisr_viewer.views.shapes.looks import POINT_PX, as_ghost, as_marks, clip, make_cap
 from naisr_viewer.views.shapes.sub_plot import SubPlot, picked, set_colouring, set_points
 
 REST_SAMPLES = 4
@@ -52,6 +53,7 @@ class Canvas(QtInteractor):
         self._is_moving = self._is_held = False
         self._pressed: QPoint | None = None
         self._place = QPointF()
+        self._plane: pv._vtk.vtkPlane | None = None
         super().__init__(
             parent, shape=(1, len(colours)), border=False, auto_update=False, multi_samples=REST_SAMPLES
         )
@@ -96,7 +98,30 @@ class Canvas(QtInteractor):
         plot.ghost = None if points_mm is None else as_ghost(points_mm, faces)
         if plot.ghost is not None:
             plot.ghost.prop.color = self._ghost_colour
+            clip(plot.ghost, self._plane)
             plot.renderer.add_actor(plot.ghost, render=False, reset_camera=False)
+        plot.is_stale = True
+        self.update()
+
+    def set_section(self, section: Section | None) -> None:
+        """Draw only what lies on one side of a plane; None draws all."""
+        self._plane = None if section is None else _kept_half(section)
+        for plot in self._plots:
+            for actor in filter(None, (plot.actor, plot.ghost)):
+                clip(actor, self._plane)
+        self.refresh()
+
+    def set_cut(self, index: int, cut: Cut | None) -> None:
+        """Fill what the plane cuts of a surface; None removes that."""
+        plot = self._plots[index]
+        if plot.cap is None and cut is None:
+            return
+        if plot.cap is None:
+            plot.cap = make_cap()
+            self._paint(plot)
+            for actor in plot.cap:
+                plot.renderer.add_actor(actor, render=False, reset_camera=False)
+        plot.cap.show(cut)
         plot.is_stale = True
         self.update()
 
@@ -286,7 +311,10 @@ class Canvas(QtInteractor):
 
     def _paint(self, plot: SubPlot) -> None:
         """In the colour of a sub-plot."""
-        plot.actor.prop.color = blend(plot.colour, self._ground, PALENESS if plot.is_pale else 0.0)
+        colour = blend(plot.colour, self._ground, PALENESS if plot.is_pale else 0.0)
+        plot.actor.prop.color = colour
+        if plot.cap is not None:
+            plot.cap.colour(colour)
         plot.is_stale = True
 
     def _aspect(self, plot: SubPlot) -> float:
@@ -319,3 +347,11 @@ class Canvas(QtInteractor):
         plot.renderer.SetUseOIT(False)  # a ghost is one layer: nothing to sort, which would cost time
         set_colouring(plot, None)
         return plot
+
+
+def _kept_half(section: Section) -> pv._vtk.vtkPlane:
+    """The plane, its normal towards what is drawn."""
+    plane, normal = pv._vtk.vtkPlane(), np.asarray(section.normal)
+    plane.SetOrigin(*(normal * section.offset_mm))
+    plane.SetNormal(*(normal if section.is_low_cut else -normal))
+    return plane

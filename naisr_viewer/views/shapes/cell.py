@@ -14,11 +14,13 @@ from naisr_viewer.panels.scales import PanelScale
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.layouts import Panel
 from naisr_viewer.state.requests import Colouring, SurfaceResult
+from naisr_viewer.state.section import Cut
 from naisr_viewer.views.colours import panel_colour
 from naisr_viewer.views.elided import ElidedLabel
 from naisr_viewer.views.shapes.arrangement import CELL_STRIPS, Strips
 from naisr_viewer.views.shapes.colour_bar import WIDTH_PX, ColourBar
 from naisr_viewer.words.captions import small
+from naisr_viewer.words.section import area as area_of
 
 MARGIN_PX = 10
 DOT_PX = 10
@@ -77,6 +79,7 @@ class Cell:
         words: what the caption says.
         scale: of its colours; None where it has none now.
         result: the surface, or None as long as there is none.
+        cut: where the section plane cuts it; None without one.
     """
 
     title: Title
@@ -85,11 +88,18 @@ class Cell:
     words: str = ""
     scale: PanelScale | None = None
     result: SurfaceResult | None = None
+    cut: Cut | None = None
 
     @property
     def has_surface(self) -> bool:
         """Whether there is anything to see."""
         return self.result is not None and len(self.result.points_mm) > 0
+
+    @property
+    def told(self) -> str:
+        """What the caption says, and how large the cut is."""
+        cut = "" if self.cut is None or self.result is None else area_of(self.cut)
+        return "<br>".join(filter(None, (self.words, cut)))
 
     @property
     def widgets(self) -> list[QWidget]:
@@ -134,7 +144,7 @@ class Cell:
         """
         self.title.setGeometry(area.left(), area.top(), area.width(), strips.title)
         self.caption.setContentsMargins(0, strips.bar, 0, 0)
-        self.caption.setText(self.words if area.width() >= ROOMY_PX else small(self.words))
+        self.caption.setText(self.told if area.width() >= ROOMY_PX else small(self.told))
         height = max(strips.caption + strips.bar, self.caption.heightForWidth(area.width()))
         top = area.top() + max(area.height() - height, strips.title)
         self.caption.setGeometry(area.left(), top, area.width(), area.bottom() + 1 - top)

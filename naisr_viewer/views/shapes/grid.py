@@ -64,8 +64,13 @@ class Grid:
         """The line beneath a sub-plot, and more about it on hover."""
         cell = self.cells[panel]
         cell.words = text
-        cell.caption.setText(text)
         cell.caption.setToolTip(hint)
+        self.say_again(panel)
+
+    def say_again(self, panel: Panel) -> None:
+        """The same where there is more to say."""
+        cell = self.cells[panel]
+        cell.caption.setText(cell.told)
         if panel in self._areas:
             cell.place(self._areas[panel], self._strips)
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 
 from naisr_viewer.state.requests import Scale, SurfaceResult
-from naisr_viewer.views.colours import SCALE_COLOURS
+from naisr_viewer.state.section import Cut
+from naisr_viewer.views.colours import SCALE_COLOURS, blend
 
 TABLE_COLOURS = 256
 """Colours of a scale that OpenGL is told; enough to look like a gradient."""
@@ -26,6 +28,10 @@ GHOST_POINT_PX = 3
 
 MARK_PX = 11
 """Diameter of the dot at a marked place."""
+
+CUT_LINE_PX = 2
+INK, INKINESS = "#000000", 0.45
+"""Width of the outline of a cut, and how much darker than the surface it is."""
 
 GHOST_OPACITY = 0.35
 GHOST_DEPTH = 80.0
@@ -106,3 +112,58 @@ def as_marks(points_mm: NDArray[np.float32], colours: Sequence[str]) -> pv.Actor
     actor.prop.lighting = False
     actor.pickable = False
     return actor
+
+
+class Cap(NamedTuple):
+    """The look of what a plane lays open of a surface, without light of its own.
+
+    Attributes:
+        filled: the inside.
+        outline: a line around it, which also covers the seam.
+    """
+
+    filled: pv.Actor
+    outline: pv.Actor
+
+    def show(self, cut: Cut | None) -> None:
+        """Fill what is closed, and draw all outlines; None takes both away."""
+        outline = pv.PolyData() if cut is None else outline_of(cut)
+        is_closed = cut is not None and cut.area_mm2 is not None and len(cut.lines) > 0
+        self.filled.mapper.dataset.copy_from(fill(outline) if is_closed else pv.PolyData(), deep=False)
+        self.outline.mapper.dataset.copy_from(outline, deep=False)
+
+    def colour(self, colour: str) -> None:
+        """In the colour of the surface (``#rrggbb``), the line darker."""
+        self.filled.prop.color, self.outline.prop.color = colour, blend(colour, INK, INKINESS)
+
+
+def make_cap() -> Cap:
+    """One that is still empty."""
+    cap = Cap(*(pv.Actor(mapper=pv.DataSetMapper(pv.PolyData())) for _ in range(2)))
+    for actor in cap:
+        actor.prop.lighting, actor.prop.line_width = False, CUT_LINE_PX
+        actor.mapper.SetResolveCoincidentTopologyToPolygonOffset()
+    cap.outline.mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, -GHOST_DEPTH)
+    return cap
+
+
+def outline_of(cut: Cut) -> pv.PolyData:
+    """The lines of a cut."""
+    if len(cut.lines) == 0:
+        return pv.PolyData()
+    return pv.PolyData(cut.points_mm, lines=np.insert(cut.lines, 0, 2, axis=1).ravel())
+
+
+def fill(outline: pv.PolyData) -> pv.PolyData:
+    """What closed lines enclose, as triangles."""
+    triangles = pv._vtk.vtkContourTriangulator()
+    triangles.SetInputData(outline)
+    triangles.Update()
+    return pv.wrap(triangles.GetOutput())
+
+
+def clip(actor: pv.Actor, plane: pv._vtk.vtkPlane | None) -> None:
+    """Draw only what lies on the side of a plane that its normal points to; None draws all."""
+    actor.mapper.RemoveAllClippingPlanes()
+    if plane is not None:
+        actor.mapper.AddClippingPlane(plane)

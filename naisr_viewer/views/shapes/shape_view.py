@@ -18,6 +18,7 @@ from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.camera import Camera
 from naisr_viewer.state.layouts import FULL_SHAPE, Panel
 from naisr_viewer.state.requests import SurfaceResult
+from naisr_viewer.state.section import Cut, Section
 from naisr_viewer.views.colours import ghost_colour, panel_colour
 from naisr_viewer.views.shapes.arrangement import (
     Rows,
@@ -90,6 +91,7 @@ class ShapeView(QWidget):
         self._heads: Heads | None = None
         self._bands = HeadBands(self)
         self._colours: Colours = {}
+        self._section: Section | None = None
         self._direction = OBLIQUE
         self._framed = self._looked_after = False
         self._moving = False
@@ -129,6 +131,7 @@ class ShapeView(QWidget):
                 cell.bar.limit_moved.connect(lambda limit, panel=panel: self.limit_moved.emit(panel, limit))
                 cell.bar.fit_requested.connect(lambda panel=panel: self.fit_requested.emit(panel))
         self._ghost, self._marks, self._colours = (None, NO_FACES), {}, {}
+        self._section = None
         self._direction = OBLIQUE
         self._theme = theme
         self._open_canvas()
@@ -190,10 +193,11 @@ class ShapeView(QWidget):
         cell = self._grid.cells.get(panel)
         if cell is None:
             return
-        cell.result = None
+        cell.result = cell.cut = None
         self.set_caption(panel, "", "")
         if self._canvas is not None:
             self._canvas.clear_surface(self._grid.index(panel))
+            self._canvas.set_cut(self._grid.index(panel), None)
 
     def show_ghost(self, points_mm: NDArray[np.float32] | None, faces: NDArray[np.int64] = NO_FACES) -> None:
         """Lay a scan over the full shape, translucent; without faces as dots.
@@ -207,6 +211,24 @@ class ShapeView(QWidget):
         self._ghost = (points_mm, faces)
         if self._canvas is not None:
             self._canvas.set_ghost(self._grid.index(FULL_SHAPE), *self._ghost)
+
+    def show_section(self, section: Section | None) -> None:
+        """Show only what lies on one side of a plane; None shows all, and takes the cuts away."""
+        self._section = section
+        if self._canvas is not None:
+            self._canvas.set_section(section)
+        if section is None:
+            for panel in self._grid.cells:
+                self.show_cut(panel, None)
+
+    def show_cut(self, panel: Panel, cut: Cut | None) -> None:
+        """Fill what the plane cuts of a surface, and tell its area; None takes that away."""
+        cell = self._grid.cells[panel]
+        if cut is not cell.cut:
+            cell.cut = cut
+            self._grid.say_again(panel)
+            if self._canvas is not None:
+                self._canvas.set_cut(self._grid.index(panel), cut)
 
     def show_marks(self, marks: Marks) -> None:
         """Mark places on surfaces, and no others."""
@@ -313,6 +335,9 @@ class ShapeView(QWidget):
         for panel in self._marks:
             self._mark(panel)
         self.show_colours(self._colours)
+        self._canvas.set_section(self._section)
+        for panel, cell in self._grid.cells.items():
+            self._canvas.set_cut(self._grid.index(panel), cell.cut)
         self._arrange()
         self._look_after()
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import pyvista as pv
 
 from naisr_viewer.state.requests import Colouring, SurfaceResult
-from naisr_viewer.views.shapes.looks import MATT, SHINY, as_polydata, is_closed, look_up_table
+from naisr_viewer.views.shapes.looks import MATT, SHINY, Cap, as_polydata, is_closed, look_up_table
 
 
 @dataclass(eq=False)
@@ -23,6 +23,7 @@ class SubPlot:
         result: what ``mesh`` was made from.
         ghost: the look of what lies over the surface.
         marks: the look of the places that are marked on it.
+        cap: the look of what the section plane cuts.
         is_pale: whether its colour is much like the ground.
         is_shown: whether it has a part of the canvas.
         is_stale: whether the canvas shows something else.
@@ -35,6 +36,7 @@ class SubPlot:
     result: SurfaceResult | None = None
     ghost: pv.Actor | None = None
     marks: pv.Actor | None = None
+    cap: Cap | None = None
     is_pale: bool = False
     is_shown: bool = False
     is_stale: bool = True
@@ -86,8 +88,12 @@ def picked(plot: SubPlot, x: float, y: float) -> Hit | None:
     picker.SetTolerance(0.0)
     picker.PickFromListOn()
     picker.AddPickList(plot.actor)
+    if plot.cap is not None:
+        picker.AddPickList(plot.cap.filled)
     if not picker.Pick(x, y, 0.0, plot.renderer):
         return None
+    if plot.cap is not None and picker.GetActor() is plot.cap.filled:
+        return None  # what the section plane lays open is no surface
     first, second, third = picker.GetPickPosition()
     numbers = None if plot.result is None else plot.result.colouring
     value = None if numbers is None else float(numbers.values[picker.GetPointId()])

@@ -18,6 +18,7 @@ from naisr_viewer.state.layouts import Layout
 from naisr_viewer.state.overlay import Overlay, Quantity
 from naisr_viewer.state.patients import Reading
 from naisr_viewer.state.pins import Pin
+from naisr_viewer.state.section import Plane, Section
 from naisr_viewer.state.session import SavedAtlas, SavedFit, SavedPatient, Session
 from naisr_viewer.state.support import Support
 
@@ -37,6 +38,7 @@ def everything(folder: Path) -> Session:
             compared=1,
             has_ghost=False,
             pins=(Pin(2, (0.1, -2.0, 3.5)),),
+            section=Section(Plane.FREE, (0.6, 0.0, -0.8), -12.5, True),
             drawer=Tab.POINT,
             overlay=Overlay(Quantity.RATE, (("mm per kg", 0.25),), is_shared=False),
             muted=("sex",),
@@ -106,6 +108,8 @@ def damaged(path: Path, *keys: str | int, value: object) -> Path:
         (("camera", "framed_mm"), [40.0, -1.0]),
         (("state", "overlay", "limits"), [["mm", 0.0]]),
         (("state", "pins", 0, "origin_mm"), [1e300, 0.0, 0.0]),
+        (("state", "section", "normal"), [1.0, 1.0, 0.0]),
+        (("state", "section", "plane"), "oblique"),
         (("atlas", "path"), "a" * 300),
         (("atlas", "path"), "a/" * 2500),
         (("window_px",), [1]),

@@ -32,11 +32,13 @@ from naisr_viewer.program.headless import pause
 from naisr_viewer.state.explorer import ExplorerState, opened, with_patient
 from naisr_viewer.state.layouts import Layout
 from naisr_viewer.state.patients import Fitted, OpenScan, Reading, Scan
+from naisr_viewer.state.section import Plane, Section
 from naisr_viewer.state.theme import ThemeChoice
 from naisr_viewer.views.drawer import Drawer
 from naisr_viewer.views.elided import ElidedLabel
 from naisr_viewer.views.main_window import MainWindow
 from naisr_viewer.views.map_bar import MapBar
+from naisr_viewer.views.section_bar import SectionBar
 
 W = TypeVar("W", bound=QWidget)
 
@@ -74,7 +76,8 @@ def state(request, card) -> ExplorerState:
     for key in range(1, 5):
         name = f"patient_{key}_<b>visit</b>_2024-03-14_segmentation_that_is_final.stl"
         result = with_patient(result, patient(key, name, result.named))
-    return replace(result, layout=Layout.FIT)
+    section = Section(Plane.CORONAL, (0.0, 1.0, 0.0), -123.4)
+    return replace(result, layout=Layout.FIT, section=section)
 
 
 @pytest.fixture
@@ -235,8 +238,9 @@ def region(window: MainWindow, widget: QWidget) -> tuple[int, int]:
     """Which part of the window a widget is in, from left to right and then down; above, in or below what
     scrolls there."""
     (drawer,), (maps,) = window.findChildren(Drawer), window.findChildren(MapBar)
-    parts = [window.covariates, maps, window.shapes, drawer, window.patients, window.statusBar()]
-    part = next(index for index, part in enumerate(parts) if part.isAncestorOf(widget))
+    (section,) = window.findChildren(SectionBar)
+    parts = [window.covariates, maps, section, window.shapes, drawer, window.patients, window.statusBar()]
+    part = next(index for index, part in enumerate(parts) if part is widget or part.isAncestorOf(widget))
     areas = parts[part].findChildren(QScrollArea)
     if not areas or areas[0].isAncestorOf(widget):
         return part, 1
