@@ -248,7 +248,7 @@ COMMANDS = (
         "Undo",
         lambda window: window.undo_requested.emit(),
         keys=("Ctrl+Z",),
-        tip="Undo the last act: a covariate or the section plane moved, a scan opened, read, fitted, compared or closed",
+        tip="Undo the last act: covariate, plane or pin; a scan opened, read, fitted, compared or closed",
         needs=frozenset({Fact.REST, Fact.PAST}),
     ),
     Command(

@@ -213,7 +213,7 @@ class MainWindow(QMainWindow):
     @property
     def _stops(self) -> list[QWidget]:
         """What the Tab key goes through, as it is read: the panels from left to right, then what is below."""
-        shapes = [*self._centre.stops, self.shapes.row_bar, *self._centre.drawer_stops]
+        shapes = [*self._centre.stops, self.shapes, self.shapes.row_bar, *self._centre.drawer_stops]
         return [*self.covariates.stops, *shapes, *self.patients.stops, self.cancel]
 
     def show_reach(self, section: Section, low_mm: float, high_mm: float) -> None:

@@ -8,15 +8,24 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt, QTimer, Signal
-from PySide6.QtGui import QMouseEvent
-from PySide6.QtWidgets import QWidget
+from PySide6.QtGui import QMouseEvent, QWheelEvent
+from PySide6.QtWidgets import QApplication, QWidget
 from pyvistaqt import QtInteractor
 
 from naisr_viewer.state.requests import SurfaceResult
 from naisr_viewer.state.section import Cut, Section
 from naisr_viewer.views.colours import PALENESS, blend
 from naisr_viewer.views.shapes.arrangement import Viewport
-from naisr_viewer.views.shapes.camera import Direction, aim, is_any_seen, seen_size
+from naisr_viewer.views.shapes.camera import (
+    Direction,
+    aim,
+    centre_on,
+    is_any_seen,
+    pan,
+    seen_size,
+    turn,
+    zoom_at,
+)
 from naisr_viewer.views.shapes.looks import POINT_PX, as_ghost, as_marks, clip, make_cap
 from naisr_viewer.views.shapes.sub_plot import SubPlot, picked, set_colouring, set_points
 
@@ -25,6 +34,9 @@ REST_SAMPLES = 4
 
 HOVER_MS = 80
 """So long a mouse rests before it is looked what is under it: never while it is on its way."""
+
+NOTCH, NOTCH_ZOOM = 120, 1.15
+"""Of a wheel, in Qt's units; how much larger it shows everything."""
 
 CLICK_PX = 4
 """A mouse that has gone so far between press and release has turned the shapes."""
@@ -41,7 +53,9 @@ class Canvas(QtInteractor):
     """
 
     drawn = Signal(int)  # the picture is on its way to the screen; how many sub-plots were drawn anew
-    clicked = Signal(int, object)  # a short click: which sub-plot, and the point (mm) of its surface there
+    clicked = Signal(
+        int, object
+    )  # a short click, no double one: which sub-plot, and the point (mm) of its surface
     chosen = Signal(int)  # a short click on a sub-plot, beside its surface too
     opened = Signal(int)  # a double click on a sub-plot, after that
     hovered = Signal(int, object)  # the mouse rests: over which sub-plot, and the Hit there or None
@@ -61,6 +75,9 @@ class Canvas(QtInteractor):
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._rest = QTimer(self, singleShot=True, interval=HOVER_MS)
         self._rest.timeout.connect(self._look_under_mouse)
+        self._single = QTimer(self, singleShot=True, interval=QApplication.doubleClickInterval())
+        self._single.timeout.connect(self._tell_clicked)
+        self._hit: tuple[int, Direction] | None = None
         self._requests = self.iren.interactor.AddObserver("RenderEvent", self._render_requested)
         self.iren.interactor.EnableRenderOff()
         self._plots = [self._sub_plot(index, colour) for index, colour in enumerate(colours)]
@@ -197,6 +214,21 @@ class Canvas(QtInteractor):
         self.refresh()
         return seen_size(self.camera, box_mm)
 
+    def turn(self, azimuth_deg: float, elevation_deg: float) -> None:
+        """Go around the shapes, to the right and up."""
+        turn(self.camera, azimuth_deg, elevation_deg)
+        self.refresh()
+
+    def pan(self, across: float, along: float) -> None:
+        """Have the shapes go to the right and up by shares of half the height of a sub-plot."""
+        pan(self.camera, across, along)
+        self.refresh()
+
+    def zoom_by(self, factor: float) -> None:
+        """Come nearer by a factor."""
+        self.camera.parallel_scale /= factor
+        self.refresh()
+
     def refresh(self) -> None:
         """Draw everything again with the next painting."""
         for plot in self._plots:
@@ -265,12 +297,25 @@ class Canvas(QtInteractor):
             self._pick(place)
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
-        """Tell it; what follows is no further click."""
+        """Tell it, and have the point there in the middle; it was no click, and what follows is none."""
         super().mouseDoubleClickEvent(event)
+        self._single.stop()
         self._pressed = None
         if event.button() is Qt.MouseButton.LeftButton:
-            for index, _ in self._plots_at(event.position()):
+            for index, plot in self._plots_at(event.position()):
+                hit = picked(plot, *self._from_below(event.position()))
+                if hit is not None:
+                    centre_on(self.camera, hit.point_mm)
+                    self.refresh()
                 self.opened.emit(index)
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Come nearer to what is under the pointer, or go away from it."""
+        factor = NOTCH_ZOOM ** (event.angleDelta().y() / NOTCH)
+        for _, plot in self._plots_at(event.position()):
+            zoom_at(self.camera, factor, self._place_in(plot, event.position()), self._aspect(plot))
+            self.refresh()
+        event.accept()
 
     def release(self) -> None:
         """Close the render window for good; nothing is drawn afterwards."""
@@ -284,8 +329,14 @@ class Canvas(QtInteractor):
         for index, plot in self._plots_at(place):
             hit = picked(plot, *self._from_below(place))
             if hit is not None:
-                self.clicked.emit(index, hit.point_mm)
+                self._hit = index, hit.point_mm
+                self._single.start()
             self.chosen.emit(index)
+
+    def _tell_clicked(self) -> None:
+        """It has not become a double click."""
+        if self._hit is not None:
+            self.clicked.emit(*self._hit)
 
     def _look_under_mouse(self) -> None:
         for index, plot in self._plots_at(self._place):
@@ -303,6 +354,12 @@ class Canvas(QtInteractor):
             for index, plot in enumerate(self._plots)
             if plot.is_shown and plot.renderer.IsInViewport(round(x), round(y))
         ]
+
+    def _place_in(self, plot: SubPlot, place: QPointF) -> tuple[float, float]:
+        """A place on the canvas to the right and up of the middle of a sub-plot, 1 at its edges."""
+        left, bottom, right, top = plot.renderer.GetViewport()
+        x, y = place.x() / self.width(), 1 - place.y() / self.height()
+        return (2 * x - left - right) / (right - left), (2 * y - bottom - top) / (top - bottom)
 
     def _from_below(self, place: QPointF) -> tuple[float, float]:
         """A place on the canvas in pixels of the screen, counted from below as VTK does."""

@@ -19,11 +19,15 @@ from naisr_viewer.views.colours import panel_colour
 from naisr_viewer.views.elided import ElidedLabel
 from naisr_viewer.views.shapes.arrangement import CELL_STRIPS, Strips
 from naisr_viewer.views.shapes.colour_bar import WIDTH_PX, ColourBar
+from naisr_viewer.views.shapes.compass import SIZE_PX, Compass
 from naisr_viewer.words.captions import small
 from naisr_viewer.words.section import area as area_of
 
 MARGIN_PX = 10
 DOT_PX = 10
+
+COMPASS_SHARE, COMPASS_GAP_PX = 0.4, 4
+"""Of the room of a shape the compass takes no more, and stands so far from its corner."""
 
 ROOMY_PX = 116
 """A caption that is narrower has small letters; four words in usual ones are hardly wider."""
@@ -76,18 +80,22 @@ class Cell:
         title: what stands above.
         caption: the label beneath.
         bar: what its colours stand for; None where it never has any.
+        compass: which way the body lies.
         words: what the caption says.
         scale: of its colours; None where it has none now.
         result: the surface, or None as long as there is none.
+        has_room: whether the compass does not hide the shape.
         cut: where the section plane cuts it; None without one.
     """
 
     title: Title
     caption: QLabel
     bar: ColourBar | None
+    compass: Compass
     words: str = ""
     scale: PanelScale | None = None
     result: SurfaceResult | None = None
+    has_room: bool = False
     cut: Cut | None = None
 
     @property
@@ -130,10 +138,12 @@ class Cell:
         if self.bar is not None:
             self.bar.setVisible(is_seen and self.scale is not None)
             self.bar.raise_()
+        self.compass.setVisible(is_seen and self.has_room)
+        self.compass.raise_()
 
     def discard(self) -> None:
         """Take it all away."""
-        for widget in (*self.widgets, self.bar):
+        for widget in (*self.widgets, self.compass, self.bar):
             if widget is not None:
                 widget.deleteLater()
 
@@ -148,6 +158,8 @@ class Cell:
         height = max(strips.caption + strips.bar, self.caption.heightForWidth(area.width()))
         top = area.top() + max(area.height() - height, strips.title)
         self.caption.setGeometry(area.left(), top, area.width(), area.bottom() + 1 - top)
+        self.has_room = COMPASS_SHARE * min(area.width(), top - area.top() - strips.title) >= SIZE_PX
+        self.compass.move(area.left() + COMPASS_GAP_PX, top - SIZE_PX - COMPASS_GAP_PX)
         if self.bar is not None:
             width = min(WIDTH_PX, area.width())
             self.bar.setGeometry(area.left() + (area.width() - width) // 2, top, width, strips.bar)
@@ -166,4 +178,4 @@ def make_cell(panel: Panel, atlas: AtlasCard, parent: QWidget) -> Cell:
     bar = ColourBar(kind.scale or "signed", kind.unit, parent) if kind.scale or kind.is_mapped else None
     if bar is not None:
         bar.setToolTip(kind_of(panel).hint)
-    return Cell(title, caption, bar)
+    return Cell(title, caption, bar, Compass(parent))

@@ -89,6 +89,11 @@ class Grid:
         self._place_lines(list(areas.values()))
         self.outline(self._outlined)
 
+    def turn(self, right: Sequence[float], up: Sequence[float]) -> None:
+        """Have all compasses follow the camera; directions in the picture, of length 1."""
+        for cell in self.cells.values():
+            cell.compass.turn(right, up)
+
     def outline(self, panel: Panel | None) -> None:
         """Draw a line around a sub-plot, and around no other."""
         self._outlined = panel

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QMargins, QSize, Qt, Signal, SignalInstance
-from PySide6.QtGui import QMouseEvent, QResizeEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
+from PySide6.QtGui import QFocusEvent, QKeyEvent, QMouseEvent, QResizeEvent
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QWidget
 
 from naisr_viewer.panels.kinds import all_panels
 from naisr_viewer.panels.scales import PanelScale
@@ -30,7 +30,7 @@ from naisr_viewer.views.shapes.arrangement import (
     scale_to_fit,
     viewport,
 )
-from naisr_viewer.views.shapes.camera import DIRECTIONS, OBLIQUE, Direction
+from naisr_viewer.views.shapes.camera import DIRECTIONS, OBLIQUE, Direction, axes_of
 from naisr_viewer.views.shapes.cell import columns_of, strips_of
 from naisr_viewer.views.shapes.drawing import Drawing, reserve_opengl
 from naisr_viewer.views.shapes.grid import Grid
@@ -42,6 +42,15 @@ from naisr_viewer.words.matrix import Heads
 if TYPE_CHECKING:
     from naisr_viewer.views.shapes.canvas import Canvas
     from naisr_viewer.views.shapes.sub_plot import Hit
+
+TURN_DEG, PAN, ZOOM = 7.5, 0.1, 1.15
+"""What a key does to the camera: degrees, a share of half the height of a sub-plot, a factor."""
+
+ARROWS = {Qt.Key.Key_Left: (-1, 0), Qt.Key.Key_Right: (1, 0), Qt.Key.Key_Up: (0, 1), Qt.Key.Key_Down: (0, -1)}
+"""To the right and up."""
+
+NEARER = (Qt.Key.Key_Plus, Qt.Key.Key_Equal)
+FARTHER = (Qt.Key.Key_Minus, Qt.Key.Key_Underscore)
 
 NO_FACES = np.zeros((0, 3), np.int64)
 
@@ -100,6 +109,13 @@ class ShapeView(QWidget):
         self._fit_scale = 1.0
         self._height = 1
         self._pixels_per_mm = 0.0
+        self._turned: tuple[float, ...] = ()
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setAccessibleName("Shapes")
+        self._ring = QFrame(self)
+        self._ring.setObjectName("outline")
+        self._ring.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self._ring.hide()
         self.row_bar = row_scroll(self)
         self.row_bar.valueChanged.connect(lambda _: self._arrange())
         self._area = QHBoxLayout(self)
@@ -126,6 +142,7 @@ class ShapeView(QWidget):
         self.prepare()
         self._atlas, self._visible, self._wanted = atlas, (), None
         self._grid.fill(all_panels(atlas), atlas)
+        self._turned = ()
         for panel, cell in self._grid.cells.items():
             if cell.bar is not None:
                 cell.bar.limit_moved.connect(lambda limit, panel=panel: self.limit_moved.emit(panel, limit))
@@ -292,6 +309,7 @@ class ShapeView(QWidget):
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Rearrange for the new size."""
         super().resizeEvent(event)
+        self._ring.setGeometry(self.rect())
         self._arrange()
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
@@ -303,6 +321,33 @@ class ShapeView(QWidget):
         """The same of a double click."""
         super().mouseDoubleClickEvent(event)
         self._tell(self.opened, event)
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        """A line around all shapes, unless a mouse brought the focus."""
+        super().focusInEvent(event)
+        self._ring.setVisible(event.reason() is not Qt.FocusReason.MouseFocusReason)
+        self._ring.raise_()
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        """No line any more."""
+        super().focusOutEvent(event)
+        self._ring.hide()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Arrows turn the shapes, with Shift they move them; + and - zoom."""
+        key, canvas = event.key(), self._canvas
+        if canvas is None or not self._framed:
+            super().keyPressEvent(event)
+        elif key in ARROWS:
+            across, along = ARROWS[Qt.Key(key)]
+            if event.modifiers() & Qt.KeyboardModifier.ShiftModifier:
+                canvas.pan(PAN * across, PAN * along)
+            else:
+                canvas.turn(-TURN_DEG * across, -TURN_DEG * along)
+        elif key in NEARER or key in FARTHER:
+            canvas.zoom_by(ZOOM if key in NEARER else 1 / ZOOM)
+        else:
+            super().keyPressEvent(event)
 
     def _tell(self, signal: SignalInstance, event: QMouseEvent) -> None:
         panel = self._grid.panel_at(event.position().toPoint())
@@ -463,4 +508,14 @@ class ShapeView(QWidget):
             if scale != self._pixels_per_mm:
                 self._pixels_per_mm = scale
                 self.scale_changed.emit(scale)
+        if self._canvas is not None:
+            self._turn_compasses(self._canvas)
         self.drawn.emit(count)
+
+    def _turn_compasses(self, canvas: Canvas) -> None:
+        """Have them follow the camera, if it has turned."""
+        right, up = axes_of(canvas.camera)
+        turned = (*right.tolist(), *up.tolist())
+        if turned != self._turned:
+            self._turned = turned
+            self._grid.turn(right.tolist(), up.tolist())
