@@ -111,6 +111,7 @@ def make_window(
 
     from naisr_viewer.control.atlas_watch import AtlasWatch
     from naisr_viewer.control.controller import Controller
+    from naisr_viewer.control.copying import CopyDesk
     from naisr_viewer.control.desk import PatientDesk
     from naisr_viewer.control.matrix import MatrixDesk
     from naisr_viewer.control.measuring import CurveDesk, NormsDesk
@@ -139,6 +140,7 @@ def make_window(
     MatrixDesk(window, controller, engine)  # and this
     Player(window, controller)  # and this
     SectionDesk(window, controller)  # and this
+    CopyDesk(window, controller)  # and this
     return window, controller
 
 

@@ -49,6 +49,8 @@ class Window(Protocol):
     layout_requested: SignalInstance
     theme_requested: SignalInstance
     section_switched: SignalInstance
+    picture_copy_requested: SignalInstance
+    table_copy_requested: SignalInstance
     unpin_requested: SignalInstance
     play_requested: SignalInstance
     drawer_requested: SignalInstance
@@ -75,6 +77,12 @@ class Window(Protocol):
 
     def show_document(self, page: str) -> None:
         """Open one of the documents that come with the program."""
+
+    def show_about_atlas(self) -> None:
+        """Say who is behind the atlas that is open."""
+
+    def show_keys(self) -> None:
+        """Open the sheet of keys and mouse."""
 
     def show_sides(self) -> None:
         """Show the panels beside the shapes that are switched on."""
@@ -180,7 +188,7 @@ DRAWER = (
 )
 LOOKS = tuple(_look(direction, number) for number, direction in enumerate(DIRECTIONS, start=1))
 DOCUMENTS = (
-    _document("User guide", "user-guide.md", "F1"),
+    _document("User guide", "user-guide.md", "Shift+F1"),
     _document("Methods", "methods.md"),
     _document("Results", "results.md"),
     _document("Glossary", "glossary.md"),
@@ -268,6 +276,22 @@ COMMANDS = (
         offered=lambda atlas: bool(atlas.covariates),
     ),
     Command(
+        "copy picture",
+        "Copy picture",
+        lambda window: window.picture_copy_requested.emit(),
+        keys=("Ctrl+C",),
+        tip="Copy the shapes as a picture",
+        needs=OPEN,
+    ),
+    Command(
+        "copy table",
+        "Copy table",
+        lambda window: window.table_copy_requested.emit(),
+        keys=("Ctrl+Alt+C",),
+        tip="Copy covariates, volume and cut of every view on screen, for a spreadsheet",
+        needs=OPEN,
+    ),
+    Command(
         "unpin",
         "Remove pins",
         lambda window: window.unpin_requested.emit(),
@@ -323,7 +347,21 @@ COMMANDS = (
     ),
     *LOOKS,
     *THEMES,
+    Command(
+        "keys",
+        "Keys and mouse",
+        lambda window: window.show_keys(),
+        keys=("F1",),
+        tip="All keys, and what the mouse does",
+    ),
     *DOCUMENTS,
+    Command(
+        "about atlas",
+        "About this atlas",
+        lambda window: window.show_about_atlas(),
+        tip="Who is behind the atlas, and what it can do",
+        needs=OPEN,
+    ),
     Command("about", "About", lambda window: window.about_requested.emit()),
 )
 """All that can be told."""
@@ -344,12 +382,15 @@ MENUS = {
         "open atlas", "open scan", "open session", RECENT, "go on", SEPARATOR,
         "save session", "export", "screenshot", SEPARATOR, "quit",
     ),
-    "&Edit": ("undo", "redo", "reset all", "unpin", SEPARATOR, "preferences"),
+    "&Edit": (
+        "undo", "redo", SEPARATOR, "copy picture", "copy table", SEPARATOR,
+        "reset all", "unpin", SEPARATOR, "preferences",
+    ),
     "&View": (
         *_names(LAYOUTS), "patients", *_names(DRAWER), SEPARATOR,
         "play", "section", SEPARATOR, "reset camera", *_names(LOOKS), SEPARATOR, *_names(THEMES),
     ),
-    "&Help": (*_names(DOCUMENTS), SEPARATOR, "about"),
+    "&Help": ("keys", *_names(DOCUMENTS), SEPARATOR, "about atlas", "about"),
 }  # fmt: skip
 """What stands in the menu bar, by name."""
 

@@ -39,7 +39,7 @@ from naisr_viewer.views.actions import (
 from naisr_viewer.views.centre import Centre
 from naisr_viewer.views.colours import cell_colours, pin_colour
 from naisr_viewer.views.covariates.panel import CovariatePanel
-from naisr_viewer.views.dialogs.about import about
+from naisr_viewer.views.dialogs.about import about, tell_of_atlas
 from naisr_viewer.views.dialogs.documents import DocumentWindow
 from naisr_viewer.views.dialogs.export import ExportDialog
 from naisr_viewer.views.dialogs.files import (
@@ -55,6 +55,7 @@ from naisr_viewer.views.dialogs.files import (
     is_session,
 )
 from naisr_viewer.views.dialogs.instead import ask_instead
+from naisr_viewer.views.dialogs.keys import KeysSheet
 from naisr_viewer.views.dialogs.label import ask_label
 from naisr_viewer.views.dialogs.preferences import ask_preferences
 from naisr_viewer.views.dialogs.question import ask
@@ -104,6 +105,8 @@ class MainWindow(QMainWindow):
     section_moved = Signal(float)  # where the section plane is dragged to, mm along its normal
     section_settled = Signal(float)  # where it came to rest
     section_flipped = Signal()  # the other side of it shall be shown
+    picture_copy_requested = Signal()  # Edit > Copy picture
+    table_copy_requested = Signal()  # Edit > Copy table
     unpin_requested = Signal()  # Edit > Remove pins
     play_requested = Signal()  # View > Play: whether it plays is for who moves the covariate to say
     pin_removal_requested = Signal(int)  # number of a pin whose cross was clicked
@@ -127,6 +130,7 @@ class MainWindow(QMainWindow):
         self._theme_choice = ThemeChoice.SYSTEM
         self._has_appeared = False
         self._documents: DocumentWindow | None = None
+        self._keys: KeysSheet | None = None
         self._focus = FocusRest(self)
         self._is_editable, self._can_undo, self._can_redo, self._can_go_on = True, False, False, False
         self.covariates = CovariatePanel(self)
@@ -302,6 +306,17 @@ class MainWindow(QMainWindow):
     def show_about(self, version: str) -> None:
         """Say what this program is, until it is dismissed."""
         about(self, version)
+
+    def show_about_atlas(self) -> None:
+        """Say who is behind the atlas that is open, until it is dismissed."""
+        if self._state.atlas is not None:
+            tell_of_atlas(self, self._state.atlas)
+
+    def show_keys(self) -> None:
+        """Open the sheet of keys and mouse, or bring it to the front."""
+        self._keys = self._keys or KeysSheet(self)
+        self._keys.show()
+        self._keys.raise_()
 
     def show_document(self, page: str) -> None:
         """Open one of the documents that come with the program, in the window that shows one already."""

@@ -26,8 +26,8 @@ from naisr_viewer.words.section import area as area_of
 MARGIN_PX = 10
 DOT_PX = 10
 
-COMPASS_SHARE, COMPASS_GAP_PX = 0.4, 4
-"""Of the room of a shape the compass takes no more, and stands so far from its corner."""
+COMPASS_WIDE, COMPASS_HIGH, COMPASS_GAP_PX = 0.4, 0.65, 4
+"""Of the width and height of a shape's room the compass takes no more; how far it is from its corner (px)."""
 
 ROOMY_PX = 116
 """A caption that is narrower has small letters; four words in usual ones are hardly wider."""
@@ -158,7 +158,8 @@ class Cell:
         height = max(strips.caption + strips.bar, self.caption.heightForWidth(area.width()))
         top = area.top() + max(area.height() - height, strips.title)
         self.caption.setGeometry(area.left(), top, area.width(), area.bottom() + 1 - top)
-        self.has_room = COMPASS_SHARE * min(area.width(), top - area.top() - strips.title) >= SIZE_PX
+        wide, high = COMPASS_WIDE * area.width(), COMPASS_HIGH * (top - area.top() - strips.title)
+        self.has_room = min(wide, high) >= SIZE_PX
         self.compass.move(area.left() + COMPASS_GAP_PX, top - SIZE_PX - COMPASS_GAP_PX)
         if self.bar is not None:
             width = min(WIDTH_PX, area.width())

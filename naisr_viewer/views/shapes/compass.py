@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,8 +34,24 @@ LETTERS = (
 """Left, right, back, front, head and feet of the body; x points left, y back, z up."""
 
 
-def ends(right: Sequence[float], up: Sequence[float]) -> list[tuple[str, float, float, bool]]:
-    """Letter, place (to the right and up, 1 at full length), whether it is near; far ones first.
+class End(NamedTuple):
+    """One end of an axis.
+
+    Attributes:
+        letter: which side of the body it is.
+        x: to the right of the middle, 1 at full length.
+        y: up from it.
+        is_near: whether it is on the side of the eye.
+    """
+
+    letter: str
+    x: float
+    y: float
+    is_near: bool
+
+
+def ends(right: Sequence[float], up: Sequence[float]) -> list[End]:
+    """What is seen of the axes of the body, far ends first.
 
     Args:
         right: direction to the right of the picture, of length 1.
@@ -45,7 +62,7 @@ def ends(right: Sequence[float], up: Sequence[float]) -> list[tuple[str, float, 
     is_near = near > -ALONG
     is_seen = np.hypot(across, along) >= np.where(is_near, LEAST_NEAR, LEAST_FAR)
     order = [i for i in np.argsort(near, kind="stable") if is_seen[i]]
-    return [(LETTERS[i][0], float(across[i]), float(along[i]), bool(is_near[i])) for i in order]
+    return [End(LETTERS[i][0], float(across[i]), float(along[i]), bool(is_near[i])) for i in order]
 
 
 class Compass(QWidget):
@@ -57,7 +74,7 @@ class Compass(QWidget):
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
-        self._ends: list[tuple[str, float, float, bool]] = []
+        self._ends: Sequence[End] = ()
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.resize(SIZE_PX, SIZE_PX)
         self.hide()
@@ -67,9 +84,9 @@ class Compass(QWidget):
         """Where each letter stands: to the right and up of the middle, 1 at full length."""
         return {letter: (x, y) for letter, x, y, _ in self._ends}
 
-    def turn(self, right: Sequence[float], up: Sequence[float]) -> None:
-        """Follow the camera, see :func:`ends`."""
-        self._ends = ends(right, up)
+    def show_ends(self, found: Sequence[End]) -> None:
+        """Draw what :func:`ends` has found, so that all compasses can share it."""
+        self._ends = found
         self.setAccessibleName(f"Orientation: {', '.join(self.letters)}")
         self.update()
 

@@ -11,6 +11,7 @@ from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.layouts import Panel
 from naisr_viewer.views.shapes.arrangement import Strips, separators
 from naisr_viewer.views.shapes.cell import Cell, make_cell
+from naisr_viewer.views.shapes.compass import ends
 
 
 class Grid:
@@ -91,8 +92,9 @@ class Grid:
 
     def turn(self, right: Sequence[float], up: Sequence[float]) -> None:
         """Have all compasses follow the camera; directions in the picture, of length 1."""
+        found = ends(right, up)
         for cell in self.cells.values():
-            cell.compass.turn(right, up)
+            cell.compass.show_ends(found)
 
     def outline(self, panel: Panel | None) -> None:
         """Draw a line around a sub-plot, and around no other."""

@@ -2,31 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 import pyvista as pv
 from PySide6.QtWidgets import QWidget
 
 from naisr_viewer.views.shapes.camera import DIRECTIONS, OBLIQUE, axes_of
-from naisr_viewer.views.shapes.compass import Compass
+from naisr_viewer.views.shapes.compass import Compass, ends
 
 RIGHT_UP_LEFT_DOWN = ((1, 0), (0, 1), (-1, 0), (0, -1))
 
 
 @pytest.fixture
-def compass(qtbot) -> Iterator[Compass]:
-    parent = QWidget()
-    qtbot.addWidget(parent)
-    yield Compass(parent)
+def parent(qtbot) -> QWidget:
+    widget = QWidget()
+    qtbot.addWidget(widget)
+    return widget
+
+
+@pytest.fixture
+def compass(parent) -> Compass:
+    return Compass(parent)
 
 
 def letters(compass: Compass, direction) -> dict[str, tuple[float, float]]:
     camera = pv.Camera()
     camera.focal_point, (camera.position, camera.up) = (0, 0, 0), direction
     right, up = axes_of(camera)
-    compass.turn(right.tolist(), up.tolist())
+    compass.show_ends(ends(right.tolist(), up.tolist()))
     return compass.letters
 
 
