@@ -263,6 +263,10 @@ class Controller(QObject):
         """Whether the other covariates follow the one that is moved."""
         self.go(replace(self.state, follow=follow))
 
+    def switch_edges(self) -> None:
+        """Draw the triangles of the surfaces, or no more."""
+        self.go(replace(self.state, has_edges=not self.state.has_edges))
+
     def set_support(self, support: Support) -> None:
         """Show the data over other covariates, or fold them away."""
         self.go(replace(self.state, support=support))
@@ -321,6 +325,7 @@ class Controller(QObject):
         window.shared_toggled.connect(self.set_shared)
         window.shapes.limit_moved.connect(self.set_limit)
         window.shapes.fit_requested.connect(self.fit_limit)
+        window.edges_switched.connect(self.switch_edges)
         window.drawer_requested.connect(self.set_drawer)
         window.theme_requested.connect(self.set_theme)
         window.cancel_requested.connect(self.refinement.cancel)

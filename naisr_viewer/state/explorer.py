@@ -39,6 +39,7 @@ class ExplorerState:
         pins: places that are marked in all shapes, and told of.
         matrix: what shapes are laid out by in that layout; None where there are no two covariates.
         section: the plane that all shapes are cut by; None where they are whole.
+        has_edges: whether the triangles of the surfaces are drawn.
         overlay: what the surfaces are coloured by.
         muted: covariates that are left out of the full shape.
         touched: the covariate that was moved last; empty before.
@@ -60,6 +61,7 @@ class ExplorerState:
     pins: tuple[Pin, ...] = ()
     matrix: Matrix | None = None
     section: Section | None = None
+    has_edges: bool = False
     overlay: Overlay = NOTHING_SHOWN
     muted: tuple[str, ...] = ()
     touched: str = ""
@@ -142,6 +144,7 @@ def opened(state: ExplorerState, atlas: AtlasCard) -> ExplorerState:
         layout,
         follow=state.follow,
         has_ghost=state.has_ghost,
+        has_edges=state.has_edges,
         matrix=first_matrix(atlas),
         drawer=drawer,
         support=suited(state.support, atlas),

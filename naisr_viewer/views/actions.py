@@ -49,6 +49,7 @@ class Window(Protocol):
     layout_requested: SignalInstance
     theme_requested: SignalInstance
     section_switched: SignalInstance
+    edges_switched: SignalInstance
     picture_copy_requested: SignalInstance
     table_copy_requested: SignalInstance
     unpin_requested: SignalInstance
@@ -338,6 +339,15 @@ COMMANDS = (
         is_switch=True,
     ),
     Command(
+        "edges",
+        "Triangles",
+        lambda window: window.edges_switched.emit(),
+        keys=("Ctrl+T",),
+        tip="Draw the triangles that the surfaces are made of",
+        needs=OPEN,
+        is_switch=True,
+    ),
+    Command(
         "reset camera",
         "Reset camera",
         lambda window: window.shapes.reset_camera(),
@@ -388,7 +398,7 @@ MENUS = {
     ),
     "&View": (
         *_names(LAYOUTS), "patients", *_names(DRAWER), SEPARATOR,
-        "play", "section", SEPARATOR, "reset camera", *_names(LOOKS), SEPARATOR, *_names(THEMES),
+        "play", "section", "edges", SEPARATOR, "reset camera", *_names(LOOKS), SEPARATOR, *_names(THEMES),
     ),
     "&Help": ("keys", *_names(DOCUMENTS), SEPARATOR, "about atlas", "about"),
 }  # fmt: skip

@@ -107,6 +107,7 @@ class MainWindow(QMainWindow):
     section_flipped = Signal()  # the other side of it shall be shown
     picture_copy_requested = Signal()  # Edit > Copy picture
     table_copy_requested = Signal()  # Edit > Copy table
+    edges_switched = Signal()  # View > Triangles
     unpin_requested = Signal()  # Edit > Remove pins
     play_requested = Signal()  # View > Play: whether it plays is for who moves the covariate to say
     pin_removal_requested = Signal(int)  # number of a pin whose cross was clicked
@@ -173,6 +174,8 @@ class MainWindow(QMainWindow):
             self._actions["patients"].setChecked(True)
         self.show_sides()
         self._centre.section.show_section(state.section)
+        self.shapes.show_edges(state.has_edges)
+        self._actions["edges"].setChecked(state.has_edges)
         self._actions["section"].setChecked(state.section is not None)
         self._show_maps(state)
         self._show_panels(state)

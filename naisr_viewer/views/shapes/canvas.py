@@ -26,7 +26,7 @@ from naisr_viewer.views.shapes.camera import (
     turn,
     zoom_at,
 )
-from naisr_viewer.views.shapes.looks import POINT_PX, as_ghost, as_marks, clip, make_cap
+from naisr_viewer.views.shapes.looks import INK, INKINESS, POINT_PX, as_ghost, as_marks, clip, make_cap
 from naisr_viewer.views.shapes.sub_plot import SubPlot, picked, set_colouring, set_points
 
 REST_SAMPLES = 4
@@ -126,6 +126,12 @@ class Canvas(QtInteractor):
         for plot in self._plots:
             for actor in filter(None, (plot.actor, plot.ghost)):
                 clip(actor, self._plane)
+        self.refresh()
+
+    def set_edges(self, has_edges: bool) -> None:
+        """Draw the triangles of the surfaces, in a darker colour, or not."""
+        for plot in self._plots:
+            plot.actor.prop.show_edges = has_edges
         self.refresh()
 
     def set_cut(self, index: int, cut: Cut | None) -> None:
@@ -369,7 +375,7 @@ class Canvas(QtInteractor):
     def _paint(self, plot: SubPlot) -> None:
         """In the colour of a sub-plot."""
         colour = blend(plot.colour, self._ground, PALENESS if plot.is_pale else 0.0)
-        plot.actor.prop.color = colour
+        plot.actor.prop.color, plot.actor.prop.edge_color = colour, blend(colour, INK, INKINESS)
         if plot.cap is not None:
             plot.cap.colour(colour)
         plot.is_stale = True

@@ -101,6 +101,7 @@ class ShapeView(QWidget):
         self._bands = HeadBands(self)
         self._colours: Colours = {}
         self._section: Section | None = None
+        self._has_edges = False
         self._direction = OBLIQUE
         self._framed = self._looked_after = False
         self._moving = False
@@ -237,6 +238,13 @@ class ShapeView(QWidget):
         if section is None:
             for panel in self._grid.cells:
                 self.show_cut(panel, None)
+
+    def show_edges(self, has_edges: bool) -> None:
+        """Draw the triangles of the surfaces, or not."""
+        if has_edges != self._has_edges:
+            self._has_edges = has_edges
+            if self._canvas is not None:
+                self._canvas.set_edges(has_edges)
 
     def show_cut(self, panel: Panel, cut: Cut | None) -> None:
         """Fill what the plane cuts of a surface, and tell its area; None takes that away."""
@@ -381,6 +389,7 @@ class ShapeView(QWidget):
             self._mark(panel)
         self.show_colours(self._colours)
         self._canvas.set_section(self._section)
+        self._canvas.set_edges(self._has_edges)
         for panel, cell in self._grid.cells.items():
             self._canvas.set_cut(self._grid.index(panel), cell.cut)
         self._arrange()

@@ -50,6 +50,7 @@ class WindowSignals(QObject):
     cancel_requested = Signal()
     about_requested = Signal()
     preferences_requested = Signal()
+    edges_switched = Signal()
     close_requested = Signal(object)
     closing = Signal()
 

@@ -131,3 +131,22 @@ def test_a_session_brings_the_cut_back(ready, tmp_path):
     finish(window, controller)
     assert controller.state.section == wanted and bar(window).isVisible()
     assert "cut " in window.shapes.caption(FULL_SHAPE)
+
+
+def test_the_triangles_are_drawn_until_they_are_not(ready):
+    window, controller = ready
+    window.layout_requested.emit(Layout.FULL_SHAPE)
+    window.section_switched.emit()
+    finish(window, controller)
+
+    def colours() -> int:
+        pause(0.1)
+        picture = window.shapes.canvas.grabFramebuffer()
+        middle = picture.rect().center()
+        return len({picture.pixelColor(middle + QPoint(x, y)).name() for x in range(40) for y in range(40)})
+
+    plain = colours()
+    window.edges_switched.emit()
+    assert controller.state.has_edges and colours() > 1.5 * plain
+    window.edges_switched.emit()
+    assert colours() == plain

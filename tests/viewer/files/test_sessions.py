@@ -39,6 +39,7 @@ def everything(folder: Path) -> Session:
             has_ghost=False,
             pins=(Pin(2, (0.1, -2.0, 3.5)),),
             section=Section(Plane.FREE, (0.6, 0.0, -0.8), -12.5, True),
+            has_edges=True,
             drawer=Tab.POINT,
             overlay=Overlay(Quantity.RATE, (("mm per kg", 0.25),), is_shared=False),
             muted=("sex",),
