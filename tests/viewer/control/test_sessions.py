@@ -15,7 +15,7 @@ from PySide6.QtTest import QTest
 from naisr_viewer.app import main
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.files.sessions import read_session
-from naisr_viewer.program.headless import finish
+from naisr_viewer.program.headless import finish, wait_until
 from naisr_viewer.program.start import make_window
 from naisr_viewer.state.layouts import Layout
 from naisr_viewer.views.dialogs import files
@@ -39,6 +39,7 @@ def fitted(whole_window, egg_atlas, egg_cache, tmp_path):
     canvas = window.findChild(Canvas)
     place = QPoint(canvas.width() // 2, canvas.height() // 2)
     QTest.mouseClick(canvas, Qt.MouseButton.LeftButton, pos=place)
+    wait_until(lambda: len(controller.state.pins) == 1)  # once it is no double click any more
     finish(window, controller)
     QTest.mousePress(canvas, Qt.MouseButton.LeftButton, pos=place)
     QTest.mouseMove(canvas, place + QPoint(60, 25))
