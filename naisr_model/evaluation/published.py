@@ -14,7 +14,7 @@ class Published:
     """Mean and median of a published result; None where nothing was published.
 
     Attributes:
-        label: what was measured.
+        label: the shape model, and what was known after a comma.
         cd_x100: Chamfer distance, x 100.
         emd_x100: as published, x 100; smaller than any exact balanced EMD of such shapes can be.
         hd_x100: Hausdorff distance, x 100.
@@ -27,16 +27,26 @@ class Published:
     hd_x100: Pair | None = None
     vd_cm3: Pair | None = None
 
+    @property
+    def model(self) -> str:
+        """Title of the shape model."""
+        return self.label.partition(",")[0]
+
 
 RECONSTRUCTION: Mapping[str, tuple[Published, ...]] = MappingProxyType(
     {
         "airway": (
             Published("NAISR, covariates given", (0.084, 0.044), (1.345, 1.190), (10.719, 8.577)),
             Published("NAISR, covariates inferred", (0.067, 0.039), (1.233, 1.132), (10.333, 8.404)),
+            Published("A-SDF, covariates given", (0.852, 0.226), (4.090, 2.890), (30.848, 21.965)),
+            Published("A-SDF, covariates inferred", (2.647, 1.178), (10.302, 9.068), (47.172, 37.835)),
+            Published("DeepSDF", (0.077, 0.052), (1.401, 1.266), (10.765, 9.446)),
+            Published("DIT", (0.094, 0.049), (1.414, 1.262), (11.524, 10.228)),
+            Published("NDF", (0.238, 0.117), (2.174, 1.737), (14.950, 12.516)),
         )
     }
 )
-"""By name of the population: NAISR (ICLR 2024), Table 2, paediatric airways segmented from CT."""
+"""By name of the population: Jiao et al. (ICLR 2024), Table 2, paediatric airways segmented from CT."""
 
 RECONSTRUCTION_NOTE = (
     "NAISR (ICLR 2024), Table 2, real airways from CT, so other shapes than these; "

@@ -130,13 +130,19 @@ def _require_unchanged(study: Study[Any], started: Record) -> None:
     """Make sure that the files of a study are still those of its start; a training rewrites its own often."""
     if changed := [name for name, value in identity(study).items() if value != started[name]]:
         raise InputError(
-            f"the {changed[0]} {getattr(study, changed[0])} was changed while it was evaluated; "
+            f"the {changed[0]} {_told(getattr(study, changed[0]))} was changed while it was evaluated; "
             "give a copy, or wait until nobody writes to it, and run again"
         )
 
 
+def _told(value: Any) -> str:
+    return " or ".join(map(str, value)) if isinstance(value, tuple) else str(value)
+
+
 def _contents(value: Any) -> Any:
     """The value of an option; of a file or a store's index its fingerprint, None where it is missing."""
+    if isinstance(value, tuple):
+        return [_contents(each) for each in value]
     if not isinstance(value, Path):
         return value
     file = value / INDEX if value.is_dir() else value

@@ -7,6 +7,7 @@ from types import MappingProxyType
 from typing import Any
 
 from naisr_model.evaluation.studies.calibration import Calibration
+from naisr_model.evaluation.studies.comparison import Comparison
 from naisr_model.evaluation.studies.completion import Completion
 from naisr_model.evaluation.studies.fitting import Fitting
 from naisr_model.evaluation.studies.norms import NormsStudy
@@ -17,6 +18,7 @@ from naisr_model.evaluation.study import Study
 STUDIES: Mapping[str, type[Study[Any]]] = MappingProxyType(
     {
         "reconstruction": Reconstruction,
+        "comparison": Comparison,
         "transfer": Transfer,
         "completion": Completion,
         "fitting": Fitting,

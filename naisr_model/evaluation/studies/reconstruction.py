@@ -153,7 +153,8 @@ class Reconstruction:
     def markdown(self, report: Mapping[str, Any]) -> str:
         """The tables of a report, also of one that was read back from JSON, with units and definitions."""
         atlas = opened(self.atlas)
-        rows = published.RECONSTRUCTION.get(atlas.name, ())
+        title = atlas.checkpoint.model().title
+        rows = [row for row in published.RECONSTRUCTION.get(atlas.name, ()) if row.model == title]
         ways = {"covariates given": report, "covariates inferred": report["inferred"]}
         sections = [
             _distance_table(ways if atlas.covariates else {"no covariates": report}, rows),
@@ -200,12 +201,16 @@ def _of_the_template(atlas: Atlas, row: int) -> list[Question]:
 
 
 def refitted(atlas: Atlas, shape: HeldOut, known: Values, progress: Progress = SILENT) -> Record:
-    """A held-out shape fitted with some covariates known: its distances, if any, and its components."""
+    """A held-out shape fitted with some covariates known: its distances, if any, components and seconds."""
     fit = atlas.fit(shape.mesh_mm, known, extrapolate=True, progress=progress)
     values = {**fit.covariates, **known}
     surface = atlas.shape(values, fit.latent, RESOLUTION, extrapolate=True, progress=progress.quiet)
     found = compare(shape.mesh_mm, surface) if len(surface.faces) else None
-    return {"distances": found and found.to_json(), "components": component_count(surface)}
+    return {
+        "distances": found and found.to_json(),
+        "components": component_count(surface),
+        "fit_s": fit.seconds,
+    }
 
 
 def _distances(records: Iterable[Record]) -> list[Distances]:

@@ -19,6 +19,8 @@ from eggs import egg
 from naisr_model.checkpoint import load, save
 from naisr_model.covariates import Population
 from naisr_model.data import populations
+from naisr_model.evaluation.metrics import compare
+from naisr_model.evaluation.studies import reconstruction
 
 LARGER = 1.02
 """Everybody is a little larger than the covariates tell."""
@@ -38,6 +40,14 @@ class EggPeople(NamedTuple):
 
     atlas: Path
     larger: float = LARGER
+
+
+@pytest.fixture
+def coarse(monkeypatch) -> None:
+    """Small surfaces and few samples: what is measured is tested elsewhere."""
+    monkeypatch.setattr(reconstruction, "RESOLUTION", 64)
+    monkeypatch.setattr(reconstruction, "CHECK_RESOLUTION", 32)
+    monkeypatch.setattr(reconstruction, "compare", partial(compare, samples=1000, emd_samples=50))
 
 
 @pytest.fixture(scope="session")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from functools import partial
 
 import pytest
 from rich.console import Console
@@ -11,8 +10,7 @@ from rich.markdown import Markdown
 
 from naisr_model import cli
 from naisr_model.errors import InputError
-from naisr_model.evaluation.metrics import Distances, compare
-from naisr_model.evaluation.studies import reconstruction
+from naisr_model.evaluation.metrics import Distances
 from naisr_model.evaluation.studies.reconstruction import Reconstruction
 from naisr_model.evaluation.study import run
 from naisr_model.evaluation.truth import TruthPoint
@@ -40,7 +38,7 @@ AIRWAY = Reconstruction(shipped_atlas())
 
 def refits(part: str, found: list[Distances | None]) -> list[dict]:
     measured = [one and one.to_json() for one in found]
-    return [{"part": part, "distances": one, "components": 1 if one else 0} for one in measured]
+    return [{"part": part, "distances": one, "components": 1 if one else 0, "fit_s": 1.0} for one in measured]
 
 
 def report(**changes: list) -> dict:
@@ -122,14 +120,6 @@ def test_a_terminal_shows_the_same_table() -> None:
     with console.capture() as shown:
         console.print(Markdown(AIRWAY.markdown(report())))
     assert "0.03 / 0.02" in shown.get()
-
-
-@pytest.fixture
-def coarse(monkeypatch) -> None:
-    """Small surfaces and few samples: what is measured is tested elsewhere."""
-    monkeypatch.setattr(reconstruction, "RESOLUTION", 64)
-    monkeypatch.setattr(reconstruction, "CHECK_RESOLUTION", 32)
-    monkeypatch.setattr(reconstruction, "compare", partial(compare, samples=1000, emd_samples=50))
 
 
 @pytest.mark.usefixtures("coarse")
