@@ -89,6 +89,7 @@ class EllipsoidAtlas:
         self.capabilities = Capabilities(
             deformable=True,
             disentangleable=True,
+            additive=True,
             evolvable=True,
             transferable=True,
             has_template=True,
