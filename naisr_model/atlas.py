@@ -18,7 +18,6 @@ from pathlib import Path
 
 import numpy as np
 import torch
-import trimesh
 from numpy.typing import ArrayLike, NDArray
 from threadpoolctl import threadpool_limits
 from torch import Tensor
@@ -35,7 +34,7 @@ from naisr_model.covariates import (
     require_known,
 )
 from naisr_model.errors import InputError
-from naisr_model.frames import Frame
+from naisr_model.frames import Extent, Frame
 from naisr_model.learning.fitting.belief import places_of
 from naisr_model.learning.fitting.evidence import ShapeFit
 from naisr_model.learning.fitting.placing import Placing, placing_of
@@ -57,6 +56,7 @@ from naisr_model.learning.fitting.target import draw_sample, target_of
 from naisr_model.models.base import ShapeModel, additive, deformable
 from naisr_model.models.devices import usable_device
 from naisr_model.progress import SILENT, Progress
+from naisr_model.shapes.kinds import Shape
 from naisr_model.surface.blending import blended
 from naisr_model.surface.carrying import carried
 from naisr_model.surface.displacements import Displacements, DisplacementTables, tabulate
@@ -67,7 +67,7 @@ from naisr_model.surface.maps import outward, rates, travelled
 from naisr_model.surface.material import origins, parts, places
 from naisr_model.surface.sparse import CHUNK, COARSEST, Field, evaluate_band
 from naisr_model.surface.tracking import CodeTracker, FadingTracker, Tracker, make_tracker
-from naisr_model.surface.volume import enclosed_volume
+from naisr_model.surface.volume import enclosed
 
 VOLUME_RESOLUTION = 128
 FINEST = 1024
@@ -115,7 +115,8 @@ class Atlas:
     ``atlas.covariates``; a binary covariate is -1 or +1, or between them); what is left out is at
     the population centre. ``latent`` is a code z ``[L]``; left out, it is 0, the population
     average. Surfaces are ``trimesh.Trimesh`` in millimetres with outward faces, so their
-    ``volume / 1000`` is in cm³; where no surface exists they have no faces. ``resolution`` is the
+    ``volume / 1000`` is in cm³; where no surface exists they have no faces. An atlas in the plane gives a
+    :class:`~naisr_model.shapes.curve.Curve` in their place, in the unit of its frame. ``resolution`` is the
     number of cells along a side of the box, a multiple of 8. ``progress`` is told the finished share, and
     ends a computation that nobody waits for any more with :class:`~naisr_model.errors.Cancelled`.
 
@@ -180,6 +181,11 @@ class Atlas:
         """Millimetres to the networks' box."""
         return self.checkpoint.frame
 
+    @property
+    def extent(self) -> Extent:
+        """What its shapes enclose, a volume or an area, and the unit that it is told in."""
+        return self.frame.extent
+
     def sdf(
         self,
         points_mm: ArrayLike,
@@ -221,7 +227,7 @@ class Atlas:
         extrapolate: bool = False,
         tracker: Tracker | None = None,
         progress: Progress = SILENT,
-    ) -> trimesh.Trimesh:
+    ) -> Shape:
         """The full shape, the zero level set of Phi(p, c, z).
 
         A ``tracker`` of this atlas and code makes it several times faster; the surface is the same.
@@ -244,7 +250,7 @@ class Atlas:
         extrapolate: bool = False,
         tracker: Tracker | None = None,
         progress: Progress = SILENT,
-    ) -> trimesh.Trimesh:
+    ) -> Shape:
         """The effect of one covariate, Phi_i(p, c_i, z): Phi with the others at their centre.
 
         The displacements of several covariates add at one query point; these surfaces do not. A
@@ -268,7 +274,7 @@ class Atlas:
         resolution: int = 128,
         *,
         progress: Progress = SILENT,
-    ) -> trimesh.Trimesh:
+    ) -> Shape:
         """The template, the zero level set of T.
 
         Raises:
@@ -279,7 +285,7 @@ class Atlas:
 
     def tabulate(
         self,
-        template: trimesh.Trimesh,
+        template: Shape,
         latent: ArrayLike | None = None,
         *,
         progress: Progress = SILENT,
@@ -292,16 +298,18 @@ class Atlas:
             progress: told the finished share, checked between chunks of points.
 
         Raises:
-            InputError: where the model gives the covariates no displacements of their own.
+            InputError: where the model gives the covariates no displacements of their own, or of curves.
             Cancelled: when nobody waits for it any more.
         """
         model = additive(self._model)
+        if self.frame.dim != 3:
+            raise InputError("previews are carried in space only; ask this atlas for the curve itself")
         ranges = [(float(low), float(high)) for low, high in (c.normalise(c.range) for c in self.covariates)]
         bounds = self.frame.to_model(template.bounds)
         code = self._latent(latent)
         return tabulate(model, ranges, code, bounds, progress=progress)
 
-    def tracker(self, template: trimesh.Trimesh, tables: DisplacementTables) -> CodeTracker:
+    def tracker(self, template: Shape, tables: DisplacementTables) -> CodeTracker:
         """What carries ``template`` to any covariates in milliseconds, vertex by vertex.
 
         It also makes :meth:`shape` and :meth:`effect` faster.
@@ -317,7 +325,7 @@ class Atlas:
 
     def fit(
         self,
-        shape: trimesh.Trimesh | ArrayLike,
+        shape: Shape | ArrayLike,
         known: Values | None = None,
         *,
         extrapolate: bool = False,
@@ -326,7 +334,7 @@ class Atlas:
         """The code and the unknown covariates that explain a patient's shape best, and how sure they are.
 
         Args:
-            shape: a mesh, watertight or open, or points ``[n, 3]``; millimetres of the atlas frame.
+            shape: a mesh, watertight or open, a curve, or points ``[n, dim]``; mm of the atlas frame.
             known: covariate values in real units; those left out are inferred.
             extrapolate: allow known values outside the observed range.
             progress: told the finished share, checked between steps.
@@ -363,7 +371,7 @@ class Atlas:
     def origins_mm(
         self, points_mm: ArrayLike, covariates: Values, latent: ArrayLike | None = None
     ) -> NDArray[np.float64]:
-        """The template's points ``[n, 3]`` that points ``[n, 3]`` on a shape belong to.
+        """The template's points ``[n, dim]`` that points ``[n, dim]`` on a shape belong to.
 
         Raises:
             InputError: for an unknown covariate or one out of range, and where the model deforms no template.
@@ -382,10 +390,10 @@ class Atlas:
         """Where points of the template are in a shape, and what each covariate has to do with that.
 
         Args:
-            origins_mm: on the template, ``[n, 3]``.
+            origins_mm: on the template, ``[n, dim]``.
             covariates: real values by name.
             latent: code z ``[L]``.
-            start_mm: where the points may be, ``[n, 3]``, for instance as a tracker has them.
+            start_mm: where the points may be, ``[n, dim]``, for instance as a tracker has them.
 
         Raises:
             InputError: for an unknown covariate or one out of range, where a point has no place because the
@@ -406,7 +414,7 @@ class Atlas:
     def moved_mm(
         self, points_mm: ArrayLike, covariates: Values, latent: ArrayLike | None = None
     ) -> NDArray[np.float32]:
-        """How far a shape's points ``[n, 3]`` have come from the template along its outward normals, ``[n]``.
+        """How far a shape's points ``[n, dim]`` have come from the template along its normals, ``[n]``.
 
         Raises:
             InputError: for an unknown covariate or one out of range, and where the model deforms no template.
@@ -418,7 +426,7 @@ class Atlas:
     def rates_mm(
         self, points_mm: ArrayLike, name: str, covariates: Values, latent: ArrayLike | None = None
     ) -> NDArray[np.float32]:
-        """How fast a shape's surface moves outwards with one covariate at points ``[n, 3]``, ``[n]``.
+        """How fast a shape's surface moves outwards with one covariate at points ``[n, dim]``, ``[n]``.
 
         Returns:
             Millimetres per unit of the covariate, by automatic differentiation.
@@ -435,7 +443,7 @@ class Atlas:
     def contrast_mm(
         self, points_mm: ArrayLike, name: str, covariates: Values, latent: ArrayLike | None = None
     ) -> NDArray[np.float32]:
-        """How much farther out a shape's points ``[n, 3]`` are at the second level of a covariate, ``[n]``.
+        """How much farther out a shape's points ``[n, dim]`` are at the second level of a covariate, ``[n]``.
 
         Their material points are found at both levels (or both ends of its range), everything else equal, and
         compared along the normals of the shape.
@@ -454,7 +462,7 @@ class Atlas:
         return np.sum((high - low) * normals, axis=1).astype(np.float32)
 
     def _in_pieces(self, points_mm: ArrayLike, values_at: Callable[[Tensor], Tensor]) -> NDArray[np.float32]:
-        """Values at points ``[n, 3]``, some at a time: derivatives hold all that led to them."""
+        """Values at points ``[n, dim]``, some at a time: derivatives hold all that led to them."""
         points = self._model.tensor(self.frame.to_model(points_mm))
         found = [values_at(piece).numpy(force=True) for piece in points.split(DIFFERENTIATED)]
         return np.concatenate(found)
@@ -467,10 +475,10 @@ class Atlas:
         *,
         progress: Progress = SILENT,
     ) -> NDArray[np.float64]:
-        """Where points of the template are in many shapes, ``[shapes, n, 3]`` in millimetres.
+        """Where points of the template are in many shapes, ``[shapes, n, dim]`` in millimetres.
 
         Args:
-            origins_mm: on the template, ``[n, 3]``.
+            origins_mm: on the template, ``[n, dim]``.
             covariates: real values by name, of each shape.
             latents: its code, ``[shapes, L]``; left out, the population average is meant.
             progress: told the finished share, checked between some shapes.
@@ -533,14 +541,12 @@ class Atlas:
         resolution: int,
         progress: Progress,
         guess: Field | None = None,
-    ) -> trimesh.Trimesh:
-        if self.frame.dim != 3:
-            raise InputError("surfaces are made of 3D atlases; this one holds curves in the plane")
+    ) -> Shape:
         if not 2 * COARSEST <= resolution <= FINEST or resolution % COARSEST:
             raise InputError(
                 f"resolution is {resolution}; give a multiple of {COARSEST} from {2 * COARSEST} to {FINEST}"
             )
-        lattice = Lattice(resolution)
+        lattice = Lattice(resolution, self.frame.dim)
         surface = isosurface(evaluate_band(field, lattice, progress, guess), lattice, self.frame)
         if not np.isfinite(surface.vertices).all():
             raise InputError("there are no distances at these values; choose others nearer to the data")
@@ -552,11 +558,11 @@ class Contributions:
     """How points of the template came to where they are in a shape; the effects and the person's part add up.
 
     Attributes:
-        origins_mm: the points on the template, ``[n, 3]``.
-        points_mm: the same material points in the shape, ``[n, 3]``.
-        normals: outward unit normals of the shape there, ``[n, 3]``.
-        effects_mm: how far each covariate moves them in everybody, ``[N, n, 3]``.
-        person_mm: how far the code moves them besides, ``[n, 3]``; 0 for the population average.
+        origins_mm: the points on the template, ``[n, dim]``.
+        points_mm: the same material points in the shape, ``[n, dim]``.
+        normals: outward unit normals of the shape there, ``[n, dim]``.
+        effects_mm: how far each covariate moves them in everybody, ``[N, n, dim]``.
+        person_mm: how far the code moves them besides, ``[n, dim]``; 0 for the population average.
     """
 
     origins_mm: NDArray[np.float64]
@@ -595,7 +601,7 @@ class Individual:
         resolution: int = VOLUME_RESOLUTION,
         *,
         progress: Progress = SILENT,
-    ) -> trimesh.Trimesh:
+    ) -> Shape:
         """The full shape in millimetres.
 
         Raises:
@@ -620,7 +626,7 @@ class Individual:
 
     def tracker(
         self,
-        template: trimesh.Trimesh,
+        template: Shape,
         *,
         progress: Progress = SILENT,
     ) -> FadingTracker:
@@ -648,29 +654,48 @@ class Individual:
         )
 
     @cached_property
-    def volume_cm3(self) -> float:
-        """Volume of the smooth shape; the triangles of :attr:`surface` alone hold a little less."""
-        mesh = self.surface
-        return enclosed_volume(mesh.vertices, mesh.vertex_normals, mesh.faces) / 1000
+    def extent(self) -> float:
+        """What the smooth shape encloses; the triangles of :attr:`surface` alone hold a little less."""
+        return enclosed(self.surface) / self.atlas.extent.per_unit
 
     @cached_property
-    def volume_interval_cm3(self) -> tuple[float, float]:
-        """Where the true volume is with a probability of 95 %."""
-        margin = self.volume_margin_cm3(self.surface)
-        return max(0.0, self.volume_cm3 - margin), self.volume_cm3 + margin
+    def extent_interval(self) -> tuple[float, float]:
+        """Where the true one is with a probability of 95 %."""
+        margin = self.extent_margin(self.surface)
+        return max(0.0, self.extent - margin), self.extent + margin
 
-    def volume_margin_cm3(self, mesh: trimesh.Trimesh) -> float:
-        """Half of the 95 % interval of the volume of a mesh that :meth:`shape` gave."""
-        scale = self.atlas.frame.scale_mm
+    def extent_margin(self, mesh: Shape) -> float:
+        """Half of the 95 % interval of what a shape that :meth:`shape` gave encloses."""
+        frame = self.atlas.frame
         if not len(mesh.faces):
             return 0.0
-        points = self.atlas.frame.to_model(mesh.sample(POINTS, seed=0)).astype(np.float32)
-        area = mesh.area / scale**2
+        points = frame.to_model(mesh.sample(POINTS, seed=0)).astype(np.float32)
+        area = mesh.area / frame.scale_mm ** (frame.dim - 1)
         deviation = volume_deviation(self.posterior, points, area, self.vector, self.latent)
-        return TWO_SIDED_95 * deviation * scale**3 / 1000
+        return TWO_SIDED_95 * deviation * frame.scale_mm**frame.dim / frame.extent.per_unit
+
+    @property
+    def volume_cm3(self) -> float:
+        """:attr:`extent` of a shape in space."""
+        return self._in_space.extent
+
+    @property
+    def volume_interval_cm3(self) -> tuple[float, float]:
+        """:attr:`extent_interval` of a shape in space."""
+        return self._in_space.extent_interval
+
+    def volume_margin_cm3(self, mesh: Shape) -> float:
+        """:meth:`extent_margin` of a shape in space."""
+        return self._in_space.extent_margin(mesh)
+
+    @property
+    def _in_space(self) -> Individual:
+        if self.atlas.frame.dim != 3:
+            raise InputError("a curve in the plane has no volume; ask for its area, the extent")
+        return self
 
     def surface_offsets_mm(self, points_mm: ArrayLike) -> NDArray[np.float64]:
-        """How the surface may lie along its normal at points ``[n, 3]`` on it, ``[P, n]``.
+        """How the surface may lie along its normal at points ``[n, dim]`` on it, ``[P, n]``.
 
         See :func:`~naisr_model.learning.fitting.posterior.surface_offsets`.
         """
@@ -684,7 +709,7 @@ class Individual:
         return self.posterior.noise * self.atlas.frame.scale_mm
 
     def surface_sd_mm(self, points_mm: ArrayLike) -> NDArray[np.float64]:
-        """Standard deviation of the surface along its normal at points ``[n, 3]`` on it, ``[n]``."""
+        """Standard deviation of the surface along its normal at points ``[n, dim]`` on it, ``[n]``."""
         points = self.atlas.frame.to_model(points_mm).astype(np.float32)
         deviations = surface_deviations(self.posterior, points, self.vector, self.latent)
         return deviations * self.atlas.frame.scale_mm
@@ -695,14 +720,14 @@ class Individual:
         It is :meth:`surface_sd_mm` at about :data:`PROBED` of them, and between these blended.
 
         Args:
-            points_mm: ``[n, 3]``, spread over the surface.
+            points_mm: ``[n, dim]``, spread over the surface.
         """
         points = np.asarray(points_mm)
         probed = points[:: max(1, len(points) // PROBED)]
         return TWO_SIDED_95 * blended(probed, self.surface_sd_mm(probed), points)
 
     def unexpressed(self, points_mm: ArrayLike) -> NDArray[np.bool_]:
-        """Which points ``[n, 3]`` of the patient's surface the atlas cannot express, ``[n]``.
+        """Which points ``[n, dim]`` of the patient's surface the atlas cannot express, ``[n]``.
 
         They lie farther from the fitted surface than :data:`UNEXPRESSED` standard deviations of its place
         and of the noise of the fit together.
@@ -713,7 +738,7 @@ class Individual:
         return np.asarray(np.abs(away_mm) > UNEXPRESSED * np.hypot(sd_mm, self.noise_mm))
 
     @cached_property
-    def surface(self) -> trimesh.Trimesh:
+    def surface(self) -> Shape:
         """The shape at :data:`VOLUME_RESOLUTION`, which volumes are measured on."""
         return self.shape(VOLUME_RESOLUTION)
 
@@ -813,14 +838,15 @@ class Fit:
     @property
     def remarks(self) -> tuple[str, ...]:
         """Sentences on a patient astray and covariates that it does not settle, or one on a shape missed."""
+        length = self.individual.atlas.frame.length
         if not self.is_valid:
             return (
-                f"not valid: the fitted surface is {self.residual_mm:,.1f} mm from the scan on average; "
+                f"not valid: the fitted surface is {length(self.residual_mm)} from the scan on average; "
                 "align it to the atlas, and check that it is such a shape",
             )
         sentences = []
         if self.astray_mm is not None:
-            sentences.append(f"the scan seems to lie {self.astray_mm:.1f} mm off; align it to the atlas")
+            sentences.append(f"the scan seems to lie {length(self.astray_mm)} off; align it to the atlas")
         for covariate in self.individual.atlas.covariates:
             low, high = self.intervals.get(covariate.name, (0.0, 0.0))
             extent = covariate.range[1] - covariate.range[0]
@@ -833,7 +859,7 @@ class Fit:
                 )
         return tuple(sentences)
 
-    def placing_mm(self, shape: trimesh.Trimesh | ArrayLike, *, progress: Progress = SILENT) -> Placing:
+    def placing_mm(self, shape: Shape | ArrayLike, *, progress: Progress = SILENT) -> Placing:
         """The rigid motion in millimetres after which this or a better fit explains the patient best.
 
         It is sought together with the code and the inferred covariates, see
@@ -852,26 +878,36 @@ class Fit:
         with threadpool_limits(1, user_api="blas"):
             found = placing_of(problem, sample, problem.pack(individual.vector, individual.latent), progress)
         motion = found.motion.copy()
-        motion[:3, 3] = frame.to_mm(motion[:3, 3]) - motion[:3, :3] @ np.array(frame.centre_mm)
+        motion[:-1, -1] = frame.to_mm(motion[:-1, -1]) - motion[:-1, :-1] @ np.array(frame.centre_mm)
         far, before, after = (frame.scale_mm * each for each in (found.moved, found.before, found.after))
         return Placing(motion, far, before, after)
 
     @property
+    def extent(self) -> float:
+        """What the fitted shape encloses, in the unit of :attr:`Atlas.extent`."""
+        return self.individual.extent
+
+    @property
+    def extent_interval(self) -> tuple[float, float]:
+        """Where the true one is with a probability of 95 %."""
+        return self.individual.extent_interval
+
+    @property
     def volume_cm3(self) -> float:
-        """Volume of the fitted shape."""
+        """:attr:`extent` of a shape in space."""
         return self.individual.volume_cm3
 
     @property
     def volume_interval_cm3(self) -> tuple[float, float]:
-        """Where the true volume is with a probability of 95 %."""
+        """:attr:`extent_interval` of a shape in space."""
         return self.individual.volume_interval_cm3
 
-    def shape(self, resolution: int = VOLUME_RESOLUTION) -> trimesh.Trimesh:
+    def shape(self, resolution: int = VOLUME_RESOLUTION) -> Shape:
         """The fitted shape in millimetres."""
         return self.individual.shape(resolution)
 
     def surface_sd_mm(self, points_mm: ArrayLike) -> NDArray[np.float64]:
-        """Standard deviation of the surface along its normal at points ``[n, 3]`` on it, ``[n]``."""
+        """Standard deviation of the surface along its normal at points ``[n, dim]`` on it, ``[n]``."""
         return self.individual.surface_sd_mm(points_mm)
 
     def at(self, values: Values, *, extrapolate: bool = False) -> Individual:

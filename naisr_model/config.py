@@ -149,7 +149,7 @@ class TrainingConfig:
             covariates explain what they can before the codes may.
         residual_latents: project the codes on the orthogonal complement of functions of the
             covariates, so that a code cannot carry what a covariate explains.
-        template_epochs: epochs at which the template is kept as a mesh.
+        template_epochs: epochs at which the template is kept as a mesh or a curve.
         seed: of the initial weights and of every draw.
         loss: weights of the terms.
     """

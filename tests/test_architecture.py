@@ -23,6 +23,7 @@ FLOORS = {
             *("frames", "config", "progress", "capabilities"),
         ),
         ("work",),
+        ("shapes",),
         ("data",),
         ("models",),
         ("surface",),

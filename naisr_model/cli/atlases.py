@@ -58,7 +58,9 @@ def info(atlas: AtlasFile) -> None:
         if can:
             print(f"  {CAN[name]}")
     print(f"networks: {weights:,} weights, latent code of {checkpoint.preset.network.latent}")
-    print(f"box: {2 * checkpoint.frame.scale_mm:.0f} mm wide, alignment by {checkpoint.alignment.method}")
+    width = checkpoint.frame.length(2 * checkpoint.frame.scale_mm, 0)
+    where = "in the plane, " if checkpoint.frame.dim == 2 else ""
+    print(f"box: {width} wide, {where}alignment by {checkpoint.alignment.method}")
     if checkpoint.source:
         print(f"source: {', '.join(f'{key} {value}' for key, value in checkpoint.source.items())}")
     measured = {key: value for key, value in checkpoint.training.items() if math.isfinite(value)}
@@ -92,9 +94,10 @@ def mesh(
     extrapolate: bool = False,
     device: str = "cpu",
 ) -> None:
-    """Write one surface of an atlas (STL, PLY, OBJ, VTP or GLB by the file's name).
+    """Write one surface of an atlas (STL, PLY, OBJ, VTP or GLB by the file's name) or one curve (SVG, CSV).
 
-    Coordinates are millimetres with z up; in GLB metres with y up, as that format says.
+    Coordinates are millimetres with z up; in GLB metres with y up, as that format says. Those of a curve
+    are in the unit of its atlas, with y up.
 
     Args:
         atlas: the .safetensors file.
@@ -108,14 +111,14 @@ def mesh(
     """
     from naisr_model.atlas import Atlas
     from naisr_model.covariates import read_values, require_known
-    from naisr_model.exports import format_named, mesh_bytes
+    from naisr_model.exports import require_format
+    from naisr_model.shapes.written import shape_bytes
 
-    ending = format_named(out)
-    if ending is None:
-        raise InputError(f"cannot write '{out.suffix}'; name the file .stl, .ply, .obj, .vtp or .glb")
+    require_format(out)
     if template and (effect is not None or set):
         raise InputError("the template depends on no covariate; leave out --effect and --set")
     loaded = Atlas.load(atlas, device)
+    ending = require_format(out, loaded.frame.dim)
     if set and not loaded.covariates:
         raise InputError(f"shapes of {loaded.model_title} depend on no covariates; leave out --set")
     values = read_values("--set", set or [], loaded.covariates)
@@ -136,5 +139,6 @@ def mesh(
         nearer = "train the atlas for longer" if not values else "choose values nearer to the data"
         raise InputError(f"the atlas has no surface there; {nearer}")
     with replacing(out) as temporary:
-        temporary.write_bytes(mesh_bytes(surface, ending))
-    print(f"{out}: {len(surface.faces)} faces, {surface.volume / 1000:.2f} cm³")
+        temporary.write_bytes(shape_bytes(surface, ending, loaded.frame.unit))
+    parts = {2: "segments", 3: "faces"}[loaded.frame.dim]
+    print(f"{out}: {len(surface.faces)} {parts}, {loaded.extent.told(loaded.extent.of(surface), 2)}")

@@ -17,9 +17,11 @@ from naisr_model.terminal import say
 
 if TYPE_CHECKING:
     from naisr_model.covariates import Covariate, Values  # loads numpy, which '--help' does not need
+    from naisr_model.frames import Extent
 
 PatientFile = Annotated[
-    Path, Parameter(help="a mesh, whole or in part, a label volume or a cloud of points.")
+    Path,
+    Parameter(help="a mesh, whole or in part, a label volume or a cloud of points; of a 2D atlas a curve."),
 ]
 
 
@@ -253,11 +255,17 @@ def _tell_fit(fitted: Any, alternatives: Sequence[Mapping[str, Any]]) -> None:
     for other in alternatives[1:]:
         share, values = 100 * other["probability"], _row(covariates, other["covariates"])
         print(f"or, with a probability of {share:.0f} %: {values}")
-    low, high = fitted.volume_interval_cm3
-    print(f"volume: {fitted.volume_cm3:.1f} cm³ ({low:.1f} to {high:.1f})")
-    print(f"residual: {fitted.residual_mm:.2f} mm, {fitted.seconds:.1f} s")
+    atlas = fitted.individual.atlas
+    print(f"{atlas.extent.title}: {_in_interval(atlas.extent, fitted.extent, *fitted.extent_interval)}")
+    print(f"residual: {atlas.frame.length(fitted.residual_mm, 2)}, {fitted.seconds:.1f} s")
     for sentence in fitted.remarks:
         print(sentence)
+
+
+def _in_interval(extent: Extent, value: float, low: float, high: float) -> str:
+    """``46.7 cm³ (45.1 to 48.2)``."""
+    ends = (extent.told(end).removesuffix(f" {extent.unit}") for end in (low, high))
+    return f"{extent.told(value)} ({' to '.join(ends)})"
 
 
 def _row(covariates: Iterable[Covariate], values: Values) -> str:
@@ -281,8 +289,9 @@ def _tell_series(
 def _tell_volumes(people: Sequence[Any], records: Sequence[Mapping[str, Any]], lasting: float) -> None:
     for person, record in zip(people, records, strict=True):
         where = _row(person.atlas.covariates, person.covariates)
-        low, high = record["volume_low_cm3"], record["volume_high_cm3"]
-        print(f"{where}: {record['volume_cm3']:.1f} cm³ ({low:.1f} to {high:.1f})")
+        extent = person.atlas.extent
+        told = _in_interval(extent, *(record[extent.key(*part)] for part in ((), ("low",), ("high",))))
+        print(f"{where}: {told}")
     print(f"at other covariates {100 * lasting:.0f} % of what sets the patient apart is kept")
 
 
@@ -301,7 +310,8 @@ def _tell_measures(record: Mapping[str, Any], covariates: Iterable[Covariate], f
     if "outside" in record:
         print(f"{100 * record['outside']:.1f} % of the surface lies outside the band of 95 % of people")
     if fitted is not None:
-        print(f"measured on the fit, which is {fitted.residual_mm:.2f} mm from the scan on average")
+        away = fitted.individual.atlas.frame.length(fitted.residual_mm, 2)
+        print(f"measured on the fit, which is {away} from the scan on average")
     print(f"people: {_row(covariates, record['covariates'])}")
     if fitted is not None and fitted.inferred:
         names = ", ".join(fitted.inferred)

@@ -24,6 +24,7 @@ from naisr_model.data.markups import Space, read_markups
 from naisr_model.data.meshes import rim
 from naisr_model.errors import InputError
 from naisr_model.progress import SILENT, Progress
+from naisr_model.shapes.kinds import Shape
 
 Method = Literal["none", "icp", "landmarks"]
 METHODS: tuple[str, ...] = get_args(Method)
@@ -156,9 +157,9 @@ def icp_alignment(mesh_mm: trimesh.Trimesh, seed: int = 0) -> Alignment:
 
 
 def rigid_transform(
-    alignment: Alignment, mesh_mm: trimesh.Trimesh, landmarks: Landmarks | None = None
+    alignment: Alignment, mesh_mm: Shape, landmarks: Landmarks | None = None
 ) -> NDArray[np.float64]:
-    """The 4x4 matrix from scanner millimetres to the atlas frame; a rotation and a shift.
+    """The matrix ``[dim + 1, dim + 1]`` from scanner millimetres to the atlas frame; a rotation and a shift.
 
     Args:
         alignment: the population's alignment.
@@ -169,7 +170,7 @@ def rigid_transform(
         InputError: when the landmarks needed are missing or lie on one line.
     """
     if alignment.method == "none":
-        return np.eye(4)
+        return np.eye(np.shape(mesh_mm.vertices)[1] + 1)
     if alignment.method == "icp":
         return _closest_point_transform(alignment, mesh_mm)
     return _landmark_transform(alignment, landmarks or {})

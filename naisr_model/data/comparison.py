@@ -8,12 +8,11 @@ do not hide each other.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
@@ -21,7 +20,8 @@ from naisr_model.data.align import Landmarks
 from naisr_model.data.remarks import Remark
 from naisr_model.data.sheets import numbered
 from naisr_model.data.tables import TableRow
-from naisr_model.frames import UNITS_MM
+from naisr_model.frames import UNITS_MM, Frame
+from naisr_model.shapes.kinds import KINDS, Shape, kind_of
 
 Remarks = list[list[Remark]]
 """What is said of each row."""
@@ -63,17 +63,24 @@ FLIPS = {
 }
 """What exporters confuse, as signs of the axes."""
 
+FLAT_FLIPS = {
+    "turned by half": (-1.0, -1.0),
+    "mirrored left to right": (-1.0, 1.0),
+    "mirrored upside down": (1.0, -1.0),
+}
+"""The same of curves in the plane."""
+
 
 @dataclass(frozen=True, eq=False)
 class Bulk:
-    """What is measured of a mesh for comparison, in its own coordinates.
+    """What is measured of a mesh, or a curve in the plane, for comparison, in its own coordinates.
 
     Attributes:
-        points_mm: some points evenly over its surface, ``[n, 3]``.
-        volume_mm3: enclosed.
-        area_mm2: of the surface.
+        points_mm: some points evenly over its surface, ``[n, dim]``.
+        volume_mm3: enclosed; of a curve the area.
+        area_mm2: of the surface; of a curve the length.
         length_mm: the longest side of its box.
-        spreads_mm: standard deviations of the surface along its principal axes, ``[3]``; they do not
+        spreads_mm: standard deviations of the surface along its principal axes, ``[dim]``; they do not
             change when it is moved.
     """
 
@@ -84,18 +91,33 @@ class Bulk:
     spreads_mm: NDArray[np.float64]
 
     @property
+    def dim(self) -> int:
+        """2 for curves, 3 for meshes."""
+        return self.points_mm.shape[1]
+
+    @property
+    def noun(self) -> str:
+        """What it is called."""
+        return KINDS[self.dim].noun
+
+    @property
+    def unit(self) -> str:
+        """Of its lengths, as far as that is known of it alone."""
+        return "mm" if self.dim == 3 else "units"
+
+    @property
     def radius_mm(self) -> float:
         """Median distance of the surface from its middle, which pieces far away do not change."""
         middle = np.median(self.points_mm, axis=0)
         return float(np.median(np.linalg.norm(self.points_mm - middle, axis=1)))
 
 
-def measured(mesh_mm: trimesh.Trimesh) -> Bulk:
-    """What is compared of a closed surface."""
-    areas, middles = np.asarray(mesh_mm.area_faces), np.asarray(mesh_mm.triangles_center)
+def measured(mesh_mm: Shape) -> Bulk:
+    """What is compared of a closed surface or curve."""
+    areas, middles = kind_of(mesh_mm).parts(mesh_mm)
     centre = np.average(middles, axis=0, weights=areas)
     covariance = np.cov((middles - centre).T, aweights=areas, ddof=0)
-    points, _ = trimesh.sample.sample_surface(mesh_mm, POINTS, seed=0)
+    points = mesh_mm.sample(POINTS, seed=0)
     return Bulk(
         points_mm=np.asarray(points),
         volume_mm3=float(mesh_mm.volume),
@@ -107,11 +129,30 @@ def measured(mesh_mm: trimesh.Trimesh) -> Bulk:
 
 def compared_with_people(bulks: Sequence[Bulk | None]) -> tuple[Remark, ...]:
     """What is odd about all meshes together."""
-    lengths = [bulk.length_mm for bulk in bulks if bulk is not None]
+    lengths = [bulk.length_mm for bulk in bulks if bulk is not None and bulk.dim == 3]
     if not lengths or HUMAN_MM[0] <= np.median(lengths) <= HUMAN_MM[1]:
         return ()
     sentence = f"the meshes are {np.median(lengths):.3g} mm long, as half of them show"
     return (Remark("look", "units", sentence, "look at their unit, which must be millimetres"),)
+
+
+def compared_kinds(bulks: Sequence[Bulk | None]) -> Remarks:
+    """Curves among meshes, or meshes among curves: what there are fewer of."""
+    counts = Counter(bulk.dim for bulk in bulks if bulk is not None)
+    usual = max(counts, key=lambda dim: (counts[dim], dim), default=3)
+    return [
+        [
+            Remark(
+                "refuse",
+                "kind",
+                f"it is a {bulk.noun}, most others are {KINDS[usual].plural}",
+                "prepare them apart",
+            )
+        ]
+        if bulk is not None and bulk.dim != usual
+        else []
+        for bulk in bulks
+    ]
 
 
 # --- the meshes by themselves ------------------------------------------------------------------
@@ -147,18 +188,24 @@ def _repeated(rows: Sequence[TableRow], bulks: Sequence[Bulk]) -> Remarks:
     for group in _same(np.array([_signature(bulk) for bulk in bulks])):
         for i in group:
             others = [j for j in group if j != i]
-            where = f"the mesh is that of {numbered([rows[j].number for j in others])}"
+            where = f"the {bulks[i].noun} is that of {numbered([rows[j].number for j in others])}"
             if strangers := sorted({rows[j].subject for j in others} - {rows[i].subject}):
                 names = ", ".join(f"'{name}'" for name in strangers[:5])
                 whose = f"{where}, of another subject ({names})"
-                found[i].append(Remark("refuse", "repeated", whose, "give each subject its own mesh"))
+                found[i].append(
+                    Remark("refuse", "repeated", whose, f"give each subject its own {bulks[i].noun}")
+                )
             else:
                 found[i].append(Remark("look", "repeated", f"{where}, another visit of the same subject"))
     return found
 
 
 def _signature(bulk: Bulk) -> list[float]:
-    return [bulk.volume_mm3 ** (1 / 3), bulk.area_mm2**0.5, *bulk.spreads_mm]
+    return [
+        bulk.volume_mm3 ** (1 / bulk.dim),
+        bulk.area_mm2 ** (1 / (bulk.dim - 1)),
+        *bulk.spreads_mm,
+    ]
 
 
 def _same(signatures: NDArray[np.float64]) -> list[list[int]]:
@@ -266,26 +313,29 @@ def _scale(rest: NDArray[np.float64], floor: float, usual: NDArray[np.bool_]) ->
 
 
 def _another_size(bulk: Bulk, ratio: float, certain: bool) -> Remark:
-    sentence = f"the mesh is {bulk.length_mm:.3g} mm long, {_compared(ratio)} usual at such covariates"
+    long = f"the {bulk.noun} is {bulk.length_mm:.3g} {bulk.unit} long"
+    sentence = f"{long}, {_compared(ratio)} usual at such covariates"
     others = {unit: factor for unit, factor in UNITS_MM.items() if factor != 1}
     fits = [unit for unit, factor in others.items() if abs(np.log(ratio * factor)) < np.log(1.6)]
-    remedy = "look at its unit, which must be millimetres, and at its covariates"
-    if fits:
+    unit = "millimetres" if bulk.dim == 3 else "that of the others"
+    remedy = f"look at its unit, which must be {unit}, and at its covariates"
+    if fits and bulk.dim == 3:
         remedy = f"its unit looks like {fits[0]}, so scale it by {UNITS_MM[fits[0]]:g}"
     return Remark("refuse" if certain else "look", "size", sentence, remedy)
 
 
 def _another_volume(bulk: Bulk, ratio: float) -> Remark:
-    volume = f"the volume is {bulk.volume_mm3 / 1000:.3g} cm³"
+    extent = Frame((0.0,) * bulk.dim, 1.0, bulk.unit).extent
+    volume = f"the {extent.title} is {bulk.volume_mm3 / extent.per_unit:.3g} {extent.unit}"
     sentence = f"{volume}, {_compared(ratio)} usual at such covariates"
-    return Remark("look", "volume", sentence, "look whether it is whole, and at its covariates")
+    return Remark("look", extent.title, sentence, "look whether it is whole, and at its covariates")
 
 
 def _with_debris(bulk: Bulk, bulks: Sequence[Bulk]) -> Remark:
     usual = np.median([one.length_mm for one in bulks])
     sentence = (
-        f"the mesh is {bulk.length_mm:.0f} mm long, usual are {usual:.0f} mm, and its bulk is like that of "
-        f"the others, so pieces lie far from the rest"
+        f"the {bulk.noun} is {bulk.length_mm:.0f} {bulk.unit} long, usual are {usual:.0f} {bulk.unit}, and "
+        f"its bulk is like that of the others, so pieces lie far from the rest"
     )
     return Remark("refuse", "debris", sentence, "remove them, or the others lose resolution")
 
@@ -434,8 +484,8 @@ def compared_places(
 
     Args:
         bulks: of each row's mesh.
-        transforms: 4x4, coordinates of the mesh to the atlas frame; None for rows that cannot be used, and
-            empty to compare nothing.
+        transforms: ``[dim + 1, dim + 1]``, coordinates of the mesh to the atlas frame; None for rows that
+            cannot be used, and empty to compare nothing.
     """
     found: Remarks = [[] for _ in bulks]
     pairs = zip(bulks, transforms, strict=False)
@@ -455,10 +505,10 @@ def compared_places(
     for number, (i, one) in enumerate(zip(there, lying, strict=True)):
         flip = _flip(one, reference, float(misfits[number]), float(np.median(misfits)))
         if flip:
-            sentence = f"the mesh fits the others only when it is {flip}"
+            sentence = f"the {one.bulk.noun} fits the others only when it is {flip}"
             found[i].append(Remark("refuse", "space", sentence, "export it in the space of the others"))
         elif away[number] > 5 * usual:
-            found[i].append(_elsewhere(float(away[number]), usual, bool(away[number] > 10 * usual)))
+            found[i].append(_elsewhere(one.bulk, float(away[number]), usual, bool(away[number] > 10 * usual)))
     return found
 
 
@@ -471,11 +521,11 @@ def _typical(lying: Sequence[_Lying]) -> _Lying:
 
 
 def centred(bulk: Bulk | None) -> NDArray[np.float64] | None:
-    """The shift that puts the middle of a mesh at 0, 4x4."""
+    """The shift that puts the middle of a mesh at 0, ``[dim + 1, dim + 1]``."""
     if bulk is None:
         return None
-    shift = np.eye(4)
-    shift[:3, 3] = -bulk.points_mm.mean(axis=0)
+    shift = np.eye(bulk.dim + 1)
+    shift[:-1, -1] = -bulk.points_mm.mean(axis=0)
     return shift
 
 
@@ -489,7 +539,7 @@ class _Lying:
         return self.moved(self.bulk.points_mm)
 
     def moved(self, points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(points_mm @ self.transform[:3, :3].T + self.transform[:3, 3])
+        return np.asarray(points_mm @ self.transform[:-1, :-1].T + self.transform[:-1, -1])
 
 
 def _misfit(points_mm: NDArray[np.float64], reference: _Lying) -> float:
@@ -505,8 +555,9 @@ def _flip(one: _Lying, reference: _Lying, misfit: float, usual: float) -> str:
     """What the mesh has to be turned or mirrored by to fit the others; empty where nothing is better."""
     if misfit <= 2 * usual:
         return ""
-    best = min(FLIPS, key=lambda name: _flipped_misfit(one, reference, np.array(FLIPS[name])))
-    better = _flipped_misfit(one, reference, np.array(FLIPS[best]))
+    flips: Mapping[str, tuple[float, ...]] = FLIPS if one.bulk.dim == 3 else FLAT_FLIPS
+    best = min(flips, key=lambda name: _flipped_misfit(one, reference, np.array(flips[name])))
+    better = _flipped_misfit(one, reference, np.array(flips[best]))
     return best if better < min(0.5 * misfit, 2 * usual) else ""
 
 
@@ -518,9 +569,14 @@ def _flipped_misfit(one: _Lying, reference: _Lying, signs: NDArray[np.float64]) 
     return min(_misfit(flipped, reference) for flipped in flips)
 
 
-def _elsewhere(away_mm: float, usual_mm: float, certain: bool) -> Remark:
-    sentence = f"the mesh lies {away_mm:.0f} mm from the middle of the others, usual are {usual_mm:.0f} mm"
-    remedy = 'export it in the same frame, or set method = "icp" under [alignment] in the TOML'
+def _elsewhere(bulk: Bulk, away_mm: float, usual_mm: float, certain: bool) -> Remark:
+    away, usual = (
+        f"{length:.3g} {bulk.unit}" if bulk.dim == 2 else f"{length:.0f} mm" for length in (away_mm, usual_mm)
+    )
+    sentence = f"the {bulk.noun} lies {away} from the middle of the others, usual are {usual}"
+    remedy = "export it in the same frame"
+    if bulk.dim == 3:
+        remedy += ', or set method = "icp" under [alignment] in the TOML'
     return Remark("refuse" if certain else "look", "place", sentence, remedy)
 
 

@@ -164,6 +164,12 @@ def foreign(content: bytes) -> tuple[str, str] | None:
     return None
 
 
+def is_drawing(content: bytes) -> bool:
+    """Whether it is a drawing (SVG)."""
+    start = content[:_START].lstrip()
+    return start.startswith(b"<") and _root(start).rsplit(":")[-1] == "svg"
+
+
 def is_tensors(content: bytes) -> bool:
     """Whether it begins as safetensors do: with the length of a header in JSON, and that header."""
     length = int.from_bytes(content[:8], "little")

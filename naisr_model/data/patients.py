@@ -6,8 +6,7 @@ what is left.
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -17,15 +16,14 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike, NDArray
 
-from naisr_model.data import formats, meshes, sheets, volumes
+from naisr_model.data import curves, formats, meshes, sound, volumes
+from naisr_model.data.points import POINT_ENDINGS, read_points
 from naisr_model.data.remarks import Remark, gravest_first
 from naisr_model.errors import InputError
 from naisr_model.files import require_file
 from naisr_model.frames import BOX_MARGIN, UNITS_MM, Frame
-from naisr_model.numerals import LARGEST, decimal_marks, read_number
-
-POINT_ENDINGS = {".csv", ".txt", ".xyz"}
-"""Text files of points that :func:`read_patient` knows, beside the meshes and the label volumes."""
+from naisr_model.numerals import LARGEST
+from naisr_model.shapes.kinds import Shape
 
 MOST_FACES = 500_000
 """A surface with more is decimated; a shape's detail at the networks' resolution needs far fewer."""
@@ -45,18 +43,18 @@ class PatientShape:
     Attributes:
         mesh_mm: the surface in millimetres, neighbouring faces wound alike; without faces it is a
             cloud of points. A label volume gives LPS coordinates; of a mesh or a cloud they are as
-            in the file.
+            in the file. For an atlas in the plane it is a curve.
         source: what was read, for example ``p01.nii.gz, label 2 'airway'``.
         space: ``LPS`` or ``RAS`` where the file says it, else empty.
         remarks: what was odd about the file, and what was repaired.
-        from_file: 4x4, coordinates as they were read to those of ``mesh_mm``, by every repair and
-            motion since; landmarks of the file go the same way.
+        from_file: ``[dim + 1, dim + 1]``, coordinates as they were read to those of ``mesh_mm``, by every
+            repair and motion since; landmarks of the file go the same way.
         unit_mm: how long a unit of the file is.
         is_unit_stated: whether the file says so itself, so that no guess overrules it.
         units_known: whether a person said how long a unit is, so that it is not guessed.
     """
 
-    mesh_mm: trimesh.Trimesh
+    mesh_mm: Shape
     source: str = ""
     space: Literal["LPS", "RAS", ""] = ""
     remarks: tuple[Remark, ...] = ()
@@ -73,29 +71,37 @@ class PatientShape:
     @property
     def is_closed(self) -> bool:
         """Whether the surface bounds a body, so that its volume means something."""
-        return meshes.is_closed(self.mesh_mm)
+        return sound.is_closed(self.mesh_mm)
 
     @property
     def volume_cm3(self) -> float | None:
-        """What the surface encloses; None where it is open or a cloud of points."""
-        return float(self.mesh_mm.volume) / 1000 if self.is_closed else None
+        """What a surface encloses; None where it is open, a cloud of points or a curve."""
+        return float(self.mesh_mm.volume) / 1000 if self.is_closed and self.dim == 3 else None
+
+    @property
+    def dim(self) -> int:
+        """2 of a curve in the plane, 3 of a surface."""
+        return int(np.shape(self.mesh_mm.vertices)[1])
 
 
 # --- reading ------------------------------------------------------------------------------------
 
 
-def read_patient(path: str | Path, label: int | str | None = None) -> PatientShape:
-    """Read a mesh, a label volume or a cloud of points.
+def read_patient(path: str | Path, label: int | str | None = None, dim: int = 3) -> PatientShape:
+    """Read a mesh, a label volume or a cloud of points; of shapes in the plane a curve.
 
     Args:
         path: STL, PLY, OBJ, VTK, VTP or GLB; a label volume; or text of points (CSV, TXT, XYZ) with
-            columns x, y, z.
+            columns x, y, z. A curve as :func:`~.curves.sound_curve` takes it.
         label: which label of a volume, its number or its name; may be left out where there is only one.
+        dim: 2 for a curve in the plane.
 
     Raises:
         InputError: when the file cannot be used, or a volume has several labels and none is chosen.
     """
     path = require_file(path)
+    if dim == 2:
+        return _from_curve(path, label)
     if volumes.is_label_volume(path):
         return _from_labels(path, label)
     if label is not None:
@@ -126,6 +132,23 @@ def _from_mesh(path: Path) -> PatientShape:
     return PatientShape(mesh, f"{path.name}, {kind}", file.space, remarks, file.from_file, unit_mm)
 
 
+def _from_curve(path: Path, label: int | str | None) -> PatientShape:
+    if not curves.is_curve_file(path):
+        raise InputError(
+            f"{path.name} holds no curve in the plane; give one as SVG, CSV x,y or a label image"
+        )
+    file = curves.sound_curve(path, label)
+    unit_mm = file.unit_mm or 1.0
+    return PatientShape(
+        file.curve,
+        f"{path.name}, a curve of {len(file.curve.faces):,} segments",
+        remarks=file.remarks,
+        from_file=np.diag([unit_mm, unit_mm, 1.0]),
+        unit_mm=unit_mm,
+        is_unit_stated=file.unit_mm is not None,
+    )
+
+
 def _cloud(points: NDArray[np.float64]) -> trimesh.Trimesh:
     return trimesh.Trimesh(points, np.zeros((0, 3), np.int64), process=False)
 
@@ -142,77 +165,6 @@ def _from_labels(path: Path, label: int | str | None) -> PatientShape:
         unit_mm=volume.unit_mm or 1.0,
         is_unit_stated=volume.unit_mm is not None,
     )
-
-
-def read_points(path: str | Path) -> NDArray[np.float64]:
-    """Read a text file of points: three columns, or a header that names x, y and z among others.
-
-    Any text that :mod:`naisr_model.data.sheets` reads; lines that begin with # are skipped.
-
-    Returns:
-        Coordinates as in the file, ``[n, 3]``.
-
-    Raises:
-        InputError: when the file is missing, is no such text or has a coordinate that is not finite.
-    """
-    path = Path(path)
-    try:
-        lines, _ = sheets.read_lines(path, comment="#")
-    except InputError as error:
-        raise InputError(f"{path.name} cannot be read as points: {error}") from error
-    if not lines:
-        raise InputError(f"{path.name} is empty; give a line x,y,z for each point")
-    columns = _columns(path, lines[0].cells)
-    body = lines[1:] if columns else lines
-    wide = columns or (0, 1, 2)
-    for line in body:
-        if len(line.cells) <= max(wide):
-            raise InputError(f"{path.name} row {line.number} is a line without three numbers; correct it")
-    cells = [[line.cells[column] for column in wide] for line in body]
-    if not cells:
-        raise InputError(f"{path.name} has a header and no points; export it again")
-    return _coordinates(path, cells, [line.number for line in body])
-
-
-def _coordinates(path: Path, cells: list[list[str]], numbers: list[int]) -> NDArray[np.float64]:
-    """Numbers of any spelling; at once where they are spelled as usual, since clouds are long."""
-    flat = [cell for row in cells for cell in row]
-    if not any("," in cell or "_" in cell for cell in flat):
-        with contextlib.suppress(ValueError):
-            points = np.array(flat, dtype=np.str_).astype(np.float64).reshape(-1, 3)
-            if (np.abs(points) <= LARGEST).all():
-                return points
-    marks = decimal_marks(flat)
-    points = np.zeros((len(cells), 3))
-    for i, row in enumerate(cells):
-        for j, cell in enumerate(row):
-            try:
-                points[i, j] = read_number(cell, marks)
-            except ValueError as error:
-                raise InputError(
-                    f"{path.name} row {numbers[i]} is a line without three numbers: '{cell}'{error}"
-                ) from error
-    return points
-
-
-def _columns(path: Path, first: Sequence[str]) -> tuple[int, ...]:
-    """Where x, y and z stand if the first line is a header; empty if it is numbers."""
-    if all(_is_number(part) for part in first[:3]):
-        return ()
-    names = [sheets.split_title(part)[0].lower() for part in first]
-    if not {"x", "y", "z"} <= set(names):
-        raise InputError(f"{path.name} has no columns x, y and z in '{','.join(first)[:60]}'; name them so")
-    if doubled := [axis for axis in "xyz" if names.count(axis) > 1]:
-        raise InputError(f"{path.name} has the column '{doubled[0]}' twice; rename one")
-    return tuple(names.index(axis) for axis in "xyz")
-
-
-def _is_number(text: str) -> bool:
-    try:
-        read_number(text, ",.")
-    except ValueError as error:
-        return "may be" in str(error)
-    return True
 
 
 # --- checking -----------------------------------------------------------------------------------
@@ -259,6 +211,10 @@ def _mendable(patient: PatientShape, frame: Frame, done: Container[str]) -> Iter
 def _faults(patient: PatientShape, frame: Frame) -> list[_Fault]:
     if fatal := _unusable(patient):
         return [_Fault(fatal)]
+    if patient.dim == 2:  # what a curve has of its own was looked at as it was read
+        points = np.asarray(patient.mesh_mm.vertices)
+        units = _units(patient, points, frame)
+        return [fault for fault in (units, _unmended(_position(points, frame))) if fault]
     far = meshes.far_points(patient.mesh_mm)
     main_mm = np.asarray(patient.mesh_mm.vertices, np.float64)[~far]
     units = _units(patient, main_mm, frame)
@@ -295,9 +251,9 @@ def _unusable(patient: PatientShape) -> Remark | None:
 def _is_flat(patient: PatientShape) -> bool:
     points = np.asarray(patient.mesh_mm.vertices)
     spread = np.sqrt(np.maximum(np.linalg.eigvalsh(np.cov(points.T)), 0))
-    if spread[0] <= _FLAT * spread[2]:
+    if spread[0] <= _FLAT * spread[-1]:
         return True
-    if len(patient.mesh_mm.faces) > MOST_FACES or not patient.is_closed:
+    if len(patient.mesh_mm.faces) > MOST_FACES or not patient.is_closed or patient.dim == 2:
         return False
     area, volume = float(patient.mesh_mm.area), abs(_volume_from_middle(patient.mesh_mm))
     return volume < meshes.FLAT_SHARE * area**1.5 / (6 * np.sqrt(np.pi))
@@ -311,9 +267,9 @@ def _units(patient: PatientShape, main_mm: NDArray[np.float64], frame: Frame) ->
     if low <= longest / largest_mm <= high:
         return None
     stated = "by the unit that the file states, " if patient.is_unit_stated else ""
-    size = f"the shape is {longest:.3g} mm long, the atlas's shapes are up to {largest_mm:.0f} mm"
-    sentence = f"{stated}{size}"
-    units = {} if patient.units_known else UNITS_MM
+    usual = f"the atlas's shapes are up to {frame.length(largest_mm, 0)}"
+    sentence = f"{stated}the shape is {longest:.3g} {frame.unit} long, {usual}"
+    units = {} if patient.units_known or frame.unit != "mm" else UNITS_MM
     fits = {
         unit: mm for unit, mm in units.items() if low <= longest * mm / patient.unit_mm / largest_mm <= high
     }
@@ -321,7 +277,10 @@ def _units(patient: PatientShape, main_mm: NDArray[np.float64], frame: Frame) ->
         return _guessed(fits, sentence, patient.unit_mm, alone=not stated)
     # Of known units, a short shape may be a small part; nothing makes a long one right.
     part = patient.units_known and longest < low * largest_mm
-    remedy = "scale it to millimetres (Unit in the window, else --scale), or check that it is this anatomy"
+    unit = (
+        "millimetres (Unit in the window, else --scale)" if frame.unit == "mm" else f"{frame.unit} (--scale)"
+    )
+    remedy = f"scale it to {unit}, or check that it is this anatomy"
     return _Fault(Remark("look" if part else "refuse", "units", sentence, remedy))
 
 
@@ -350,13 +309,16 @@ def _voxel_indices(patient: PatientShape) -> Remark | None:
     )
 
 
+_ALIGN = "align it to the atlas (icp or landmarks)"
+
+
 def _position(main_mm: NDArray[np.float64], frame: Frame) -> Remark | None:
     points = frame.to_model(main_mm)
     centre = (points.min(axis=0) + points.max(axis=0)) / 2
-    remedy = "align it to the atlas (icp or landmarks)"
+    remedy = _ALIGN if frame.dim == 3 else "give it in the frame of the atlas's shapes"
     if np.abs(centre).max() > 1:
         away_mm = float(np.linalg.norm(centre)) * frame.scale_mm
-        sentence = f"the shape lies {away_mm:.0f} mm from the middle of the atlas, outside its box"
+        sentence = f"the shape lies {frame.length(away_mm, 0)} from the middle of the atlas, outside its box"
         return Remark("refuse", "far", sentence, remedy)
     outside = float((np.abs(points).max(axis=1) > 1).mean())
     if not outside:
@@ -416,7 +378,7 @@ def _opening(patient: PatientShape) -> Remark | None:
 
 
 def moved(patient: PatientShape, transform: NDArray[np.float64]) -> PatientShape:
-    """The patient after a 4x4 matrix, such as that of an accepted alignment."""
+    """The patient after a matrix ``[dim + 1, dim + 1]``, such as that of an accepted alignment."""
     mesh = patient.mesh_mm.copy()
     mesh.apply_transform(transform)
     return replace(patient, mesh_mm=mesh, from_file=transform @ patient.from_file)
@@ -424,7 +386,7 @@ def moved(patient: PatientShape, transform: NDArray[np.float64]) -> PatientShape
 
 def scaled(patient: PatientShape, factor: ArrayLike) -> PatientShape:
     """Coordinates times ``factor``: one number, or one an axis for voxels that are no cubes."""
-    return moved(patient, np.diag([*np.broadcast_to(np.asarray(factor, float), 3), 1.0]))
+    return moved(patient, np.diag([*np.broadcast_to(np.asarray(factor, float), patient.dim), 1.0]))
 
 
 def flipped(patient: PatientShape) -> PatientShape:

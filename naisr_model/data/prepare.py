@@ -20,10 +20,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from naisr_model.data import align, meshes, samples, store, tables
+from naisr_model.data import align, samples, store, tables
 from naisr_model.data.align import Alignment
 from naisr_model.data.comparison import (
     centred,
+    compared_kinds,
     compared_landmarks,
     compared_places,
     compared_shapes,
@@ -32,6 +33,7 @@ from naisr_model.data.comparison import (
 )
 from naisr_model.data.remarks import Remark, answerable, gravest_first
 from naisr_model.data.report import PreparationReport, RowRemark, rejected
+from naisr_model.data.sound import sound_shape
 from naisr_model.data.split import held_out_mask
 from naisr_model.data.stages import Look, Placed, Sampling, inspect, place, write_samples
 from naisr_model.data.tables import ShapeTable, TableRow
@@ -109,12 +111,12 @@ def _prepare(table: ShapeTable, out: Path, options: PrepareOptions, progress: Pr
         held_out = held_out_mask([row.subject for row in table.rows], options.held_out, options.seed)
         looks = [(row, table.alignment.method) for row in table.rows]
         inspected = in_order(run(inspect, looks, progress.part(0.0, 0.05)))
-        inputs = _beside_each_other(table, _without_coded(table, inspected))
+        inputs = _beside_each_other(table, _of_one_kind(_without_coded(table, inspected)))
         alignment, placed = _aligned(table, inputs, held_out, run, progress.part(0.05, 0.1))
         with _telling_rejected(table, [item.remarks for item in placed]):
             usable = _usable(table, placed)
             population = tables.population_from_table(table.take(usable), held_out[usable])
-            frame = _common_frame([placed[i] for i in usable])
+            frame = _common_frame([placed[i] for i in usable], table.unit)
             sources = [(inputs[i].digest, placed[i], table.rows[i]) for i in usable]
             jobs = [_sampling(*source, frame, options, out) for source in sources]
             written = in_order(run(write_samples, jobs, progress.part(0.1, 1.0)))
@@ -241,6 +243,12 @@ def _without_coded(table: ShapeTable, looks: Sequence[Look]) -> list[Look]:
     ]
 
 
+def _of_one_kind(looks: Sequence[Look]) -> list[Look]:
+    """The looks without curves among meshes, or meshes among curves, which nothing can be compared with."""
+    odd = compared_kinds([look.bulk for look in looks])
+    return [Look((*look.remarks, *found)) if found else look for look, found in zip(looks, odd, strict=True)]
+
+
 def _answerable(table: ShapeTable, remarks: Iterable[Iterable[Remark]]) -> list[list[Remark]]:
     """What is suspected of each row, unless somebody has looked at it."""
     rows = zip(table.rows, remarks, strict=True)
@@ -313,9 +321,11 @@ def _usable(table: ShapeTable, placed: Sequence[Placed]) -> list[int]:
     raise InputError(f"none of the {len(placed)} meshes can be used; row {table.rows[0].number}: {first}")
 
 
-def _common_frame(placed: Sequence[Placed]) -> Frame:
+def _common_frame(placed: Sequence[Placed], unit: str) -> Frame:
     bounds_mm = np.array([item.bounds_mm for item in placed])
-    return enclosing_frame(bounds_mm[:, 0].min(axis=0), bounds_mm[:, 1].max(axis=0))
+    if bounds_mm.shape[-1] == 3 and unit != "mm":
+        raise InputError(f"the unit of the table is '{unit}', and meshes are in millimetres; leave it out")
+    return enclosing_frame(bounds_mm[:, 0].min(axis=0), bounds_mm[:, 1].max(axis=0), unit)
 
 
 def _reference(table: ShapeTable, inputs: Sequence[Look], held_out: NDArray[np.bool_]) -> Alignment:
@@ -335,7 +345,7 @@ def _reference(table: ShapeTable, inputs: Sequence[Look], held_out: NDArray[np.b
     # The shape of median volume is the least extreme one to move the others onto.
     volumes_mm3 = {i: bulk.volume_mm3 for i in usable if (bulk := inputs[i].bulk)}
     middle = sorted(usable, key=lambda i: volumes_mm3[i])[len(usable) // 2]
-    return align.icp_alignment(meshes.sound_mesh(table.rows[middle].mesh).mesh_mm)
+    return align.icp_alignment(sound_shape(table.rows[middle].mesh).shape_mm)
 
 
 def _landmark_reference(sets: Sequence[align.Landmarks], origin: str) -> Alignment:

@@ -13,14 +13,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from naisr_model.data import align, meshes, samples, store
+from naisr_model.data import align, samples, store
 from naisr_model.data.align import Alignment
 from naisr_model.data.comparison import Bulk, measured
 from naisr_model.data.remarks import Remark
+from naisr_model.data.sound import sound_shape
 from naisr_model.data.tables import TableRow, require_file
 from naisr_model.errors import InputError
 from naisr_model.files import replacing_folder, sha256_of
 from naisr_model.frames import Frame
+from naisr_model.shapes.kinds import kind_of
 
 
 class Look(NamedTuple):
@@ -57,7 +59,9 @@ def inspect(job: tuple[TableRow, str]) -> Look:
     row, method = job
     try:
         require_file(row.mesh)
-        file = meshes.sound_mesh(row.mesh)
+        file = sound_shape(row.mesh)
+        if kind_of(file.shape_mm).dim == 2 and method != "none":
+            raise InputError(f'{row.mesh.name} is a curve, taken as it lies; set method = "none" in the TOML')
         landmarks = None
         if method == "landmarks":
             if row.landmarks is None:
@@ -65,7 +69,7 @@ def inspect(job: tuple[TableRow, str]) -> Look:
             require_file(row.landmarks)
             landmarks = align.read_landmarks(row.landmarks, file.space or "LPS")
         digest = sha256_of(row.mesh)
-        return Look(file.remarks, digest, file.space, measured(file.mesh_mm), landmarks)
+        return Look(file.remarks, digest, file.space, measured(file.shape_mm), landmarks)
     except InputError as error:
         return Look((Remark("refuse", "file", str(error)),))
     except Exception as error:  # one damaged mesh never stops the others, whatever is wrong with it
@@ -77,7 +81,7 @@ def place(job: tuple[Alignment, Path, align.Landmarks | None]) -> Placed:
     """Where the mesh of a row that was looked at lies once it is aligned."""
     alignment, path, landmarks = job
     try:
-        mesh = meshes.sound_mesh(path).mesh_mm
+        mesh = sound_shape(path).shape_mm
         transform = align.rigid_transform(alignment, mesh, landmarks)
     except InputError as error:
         return Placed((Remark("refuse", "alignment", str(error)),))
@@ -97,14 +101,14 @@ def write_samples(job: Sampling) -> bool:
     """
     if store.is_whole(job.target, dict(zip(store.KINDS, job.counts, strict=True)), job.frame.dim):
         return False
-    mesh = meshes.sound_mesh(job.mesh).mesh_mm
+    mesh = sound_shape(job.mesh).shape_mm
     mesh.apply_transform(np.array(job.transform))
     taken = samples.sample_shape(mesh, job.frame, *job.counts, job.seed)
     with replacing_folder(job.target) as temporary:
-        for kind in store.KINDS:
-            (temporary / f"{kind}.npy").write_bytes(_npy(getattr(taken, kind)))
-        with (temporary / store.MESH).open("wb") as file:
-            mesh.export(file, file_type="ply")
+        for name in store.KINDS:
+            (temporary / f"{name}.npy").write_bytes(_npy(getattr(taken, name)))
+        kind = kind_of(mesh)
+        (temporary / kind.stored).write_bytes(kind.written(mesh))
     return True
 
 

@@ -2,7 +2,7 @@
 
 Layout: ``store.json`` (what the samples are) and, a folder a shape, ``surface.npy``, ``near.npy``,
 ``uniform.npy`` (shuffled float32 rows, see :class:`~naisr_model.data.samples.ShapeSamples`) and
-``mesh.ply`` (aligned, millimetres).
+``mesh.ply``, of curves ``curve.csv`` (aligned, millimetres).
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from naisr_model import records
@@ -23,12 +22,13 @@ from naisr_model.data.align import Alignment
 from naisr_model.errors import InputError
 from naisr_model.files import replacing
 from naisr_model.frames import Frame
+from naisr_model.shapes.kinds import KINDS as SHAPE_KINDS
+from naisr_model.shapes.kinds import Shape
 
 VERSION = 1
 INDEX = "store.json"
 SHAPES = "shapes"
 KINDS = ("surface", "near", "uniform")
-MESH = "mesh.ply"
 
 FARTHEST = 1e6
 """Model units beyond which a sample is damage; the box is 2 wide."""
@@ -123,13 +123,13 @@ class SampleStore:
         """The folder of one shape."""
         return self.path / SHAPES / self.folders[row]
 
-    def mesh(self, row: int) -> trimesh.Trimesh:
-        """The repaired and aligned surface of one row, millimetres in the atlas frame.
+    def mesh(self, row: int) -> Shape:
+        """The repaired and aligned shape of one row, millimetres in the atlas frame.
 
         Raises:
             InputError: when its file is missing or damaged.
         """
-        return _read_mesh(self.folder(row) / MESH)
+        return _read_shape(self.folder(row), self.frame.dim)
 
     def draw(
         self, rows: Sequence[int], n_surface: int, n_near: int, n_uniform: int, rng: np.random.Generator
@@ -206,18 +206,20 @@ def _find_block(path: Path, kind: str, dim: int) -> _Block:
     return _Block(path, int(array.offset), *map(int, array.shape))
 
 
-def _read_mesh(path: Path) -> trimesh.Trimesh:
+def _read_shape(folder: Path, dim: int) -> Shape:
+    kind = SHAPE_KINDS[dim]
+    path = folder / kind.stored
     try:
-        return trimesh.load_mesh(path, process=False)
+        return kind.read(path.read_bytes())
     except Exception as error:  # the reader raises whatever it likes on damaged files
         raise _damaged(path, str(error)) from error
 
 
 def is_whole(folder: Path, counts: Mapping[str, int], dim: int) -> bool:
-    """Whether a shape's folder holds its mesh and so many samples of each kind, in ``dim`` dimensions."""
+    """Whether a shape's folder holds its shape and so many samples of each kind, in ``dim`` dimensions."""
     try:
         blocks = {kind: _find_block(folder / f"{kind}.npy", kind, dim) for kind in counts}
-        _read_mesh(folder / MESH)
+        _read_shape(folder, dim)
     except InputError:
         return False
     return all(blocks[kind].rows == count and _are_sound(blocks[kind]) for kind, count in counts.items())

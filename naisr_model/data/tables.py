@@ -6,6 +6,7 @@ every other column is a covariate. A header may carry a unit: ``age [months]`` o
 that :mod:`naisr_model.data.sheets` reads will do. A TOML file with the same stem may add to it::
 
     name = "airway"
+    unit = "mm"  # of length; of curves in the plane it may be any
     [covariates.sex]
     kind = "binary"
     levels = ["F", "M"]
@@ -42,6 +43,7 @@ from naisr_model.files import replacing
 from naisr_model.numerals import IS_MISSING, decimal_marks, is_missing
 
 RESERVED = ("mesh", "subject", "visit", "landmarks")
+_OWN = ("name", "unit")
 _TABLES = ("covariates", "alignment", "source")
 _ALIGNMENT_KEYS = ("method", "origin")
 
@@ -80,6 +82,7 @@ class ShapeTable:
         remarks: what looks wrong in the table, or was set right; values far from the others first.
         codes: of each row, what is almost surely a code for a missing value; the values are NaN there.
         accepted: rows, by number, that are right whatever is suspected of them.
+        unit: of length.
     """
 
     name: str
@@ -92,6 +95,7 @@ class ShapeTable:
     remarks: tuple[Remark, ...]
     codes: tuple[tuple[Remark, ...], ...]
     accepted: frozenset[int]
+    unit: str = "mm"
 
     @property
     def summary(self) -> tuple[str, ...]:
@@ -156,6 +160,7 @@ def read_table(path: str | Path, accepted: Collection[int] = ()) -> ShapeTable:
             for row in rows
         ),
         accepted=frozenset(accepted),
+        unit=extra.get("unit", "mm"),
     )
 
 
@@ -203,15 +208,15 @@ def _read_toml(path: Path) -> dict[str, Any]:
 
 def _known_only(path: Path, extra: Mapping[str, Any], names: Sequence[str]) -> None:
     toml = f"{path.stem}.toml"
-    if unknown := sorted(set(extra) - {"name", *_TABLES}):
-        raise InputError(f"{toml} has '{unknown[0]}'; it may have name, {', '.join(_TABLES)}")
+    if unknown := sorted(set(extra) - {*_OWN, *_TABLES}):
+        raise InputError(f"{toml} has '{unknown[0]}'; it may have {', '.join((*_OWN, *_TABLES))}")
     for key in _TABLES:
         if not isinstance(extra.get(key, {}), dict):
             raise InputError(f"'{key}' in {toml} must be a table, such as [{key}]")
     alignment = extra.get("alignment", {})
     if unknown := sorted(set(alignment) - set(_ALIGNMENT_KEYS)):
         raise InputError(f"[alignment] in {toml} has '{unknown[0]}'; it may have method and origin")
-    _texts_only(toml, {"name": extra.get("name", "")} | alignment)
+    _texts_only(toml, {key: extra.get(key, "") for key in _OWN} | alignment)
     for name, settings in extra.get("covariates", {}).items():
         if name not in names:
             has = ", ".join(names)

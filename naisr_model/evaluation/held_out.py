@@ -11,7 +11,6 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-import trimesh
 
 from naisr_model.atlas import Atlas
 from naisr_model.covariates import Population
@@ -20,6 +19,7 @@ from naisr_model.data.align import Landmarks, rigid_transform
 from naisr_model.data.populations import PopulationModule, PopulationVisit
 from naisr_model.data.store import INDEX, SampleStore
 from naisr_model.errors import InputError
+from naisr_model.shapes.kinds import Shape
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class HeldOut:
     """
 
     values: dict[str, float]
-    mesh_mm: trimesh.Trimesh
+    mesh_mm: Shape
     subject: str = ""
     visit: str = ""
 
@@ -187,7 +187,7 @@ def visits_of(population: str, seed: int, patients: int) -> dict[tuple[str, str]
     return {(visit.subject, visit.visit): visit for visit in visits}
 
 
-def aligned(atlas: Atlas, mesh: trimesh.Trimesh, landmarks: Landmarks) -> trimesh.Trimesh:
+def aligned(atlas: Atlas, mesh: Shape, landmarks: Landmarks) -> Shape:
     """A scan in millimetres and its landmarks, moved to the atlas frame as the training scans were."""
     moved = mesh.copy()
     moved.apply_transform(rigid_transform(atlas.checkpoint.alignment, mesh, landmarks))

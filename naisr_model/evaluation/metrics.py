@@ -1,10 +1,10 @@
-"""How far apart two closed surfaces are, in the definitions of the NAISR paper's tables.
+"""How far apart two closed surfaces, or curves, are, in the definitions of the NAISR paper's tables.
 
 Shapes are compared after both are divided by one scale, the target's largest distance from its
 centre ("unit sphere"), so that large and small shapes count alike; values whose name ends in
 ``_x100`` are in hundredths of that scale. Surfaces stand for themselves by uniform random samples,
 so two samplings of one and the same surface are not at distance 0: with n samples on area A, the
-mean squared distance to the nearest is about A / (pi n).
+mean squared distance to the nearest is about A / (pi n); on a curve of length L it is L^2 / (2 n^2).
 """
 
 from __future__ import annotations
@@ -14,15 +14,14 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import igl
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from naisr_model.errors import InputError
+from naisr_model.shapes.kinds import Shape, kind_of
 
 SAMPLES = 30_000
 """Surface samples of each shape for the nearest-neighbour distances."""
@@ -58,8 +57,8 @@ class Pair:
         seed: of the samples.
     """
 
-    target: trimesh.Trimesh
-    shape: trimesh.Trimesh
+    target: Shape
+    shape: Shape
     samples: int = SAMPLES
     emd_samples: int = EMD_SAMPLES
     seed: int = 0
@@ -71,7 +70,7 @@ class Pair:
 
     @cached_property
     def points(self) -> tuple[Points, Points]:
-        """Independent samples of the two surfaces, ``[n, 3]`` each, enough for every metric."""
+        """Independent samples of the two surfaces, ``[n, dim]`` each, enough for every metric."""
         one, other = np.random.SeedSequence(self.seed).spawn(2)
         count = max(self.samples, self.emd_samples)
         return _sample(self.target, count, one), _sample(self.shape, count, other)
@@ -122,7 +121,7 @@ class Distances:
     """What separates a shape from its target.
 
     Attributes:
-        values: by the keys of :data:`METRICS`, in their order.
+        values: by the keys of :data:`METRICS` or :data:`PLANE_METRICS`, in their order.
         samples: surface samples of each shape behind all but the EMD and the volume.
         emd_samples: surface samples of each shape behind the EMD.
     """
@@ -141,19 +140,19 @@ class Distances:
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> Distances:
         """Of what :meth:`to_json` gave."""
-        values = {metric.key: record[metric.key] for metric in METRICS}
+        values = {metric.key: record[metric.key] for metric in ALL_METRICS if metric.key in record}
         return cls(values, record["samples"], record["emd_samples"])
 
 
 def compare(
-    target: trimesh.Trimesh,
-    shape: trimesh.Trimesh,
+    target: Shape,
+    shape: Shape,
     *,
     samples: int = SAMPLES,
     emd_samples: int = EMD_SAMPLES,
     seed: int = 0,
 ) -> Distances:
-    """All :data:`METRICS` of ``shape`` against ``target``, both in millimetres.
+    """All :data:`METRICS`, of curves :data:`PLANE_METRICS`, of a shape against its target, in millimetres.
 
     Args:
         target: the true shape; it sets the scale.
@@ -166,10 +165,11 @@ def compare(
         InputError: when either has no faces.
     """
     pair = Pair(target, shape, samples, emd_samples, seed)
-    return Distances({metric.key: metric.measure(pair) for metric in METRICS}, samples, emd_samples)
+    asked = _METRICS_IN[kind_of(target).dim]
+    return Distances({metric.key: metric.measure(pair) for metric in asked}, samples, emd_samples)
 
 
-def unit_scale(target: trimesh.Trimesh) -> float:
+def unit_scale(target: Shape) -> float:
     """Largest distance in millimetres of the surface from the centre of its bounding box."""
     _require_surface(target)
     used = target.vertices[np.unique(target.faces)]
@@ -206,22 +206,22 @@ def earth_movers(here: Points, there: Points) -> float:
     return float(costs[linear_sum_assignment(costs)].mean())
 
 
-def volume_difference_cm3(target: trimesh.Trimesh, shape: trimesh.Trimesh) -> float:
+def volume_difference_cm3(target: Shape, shape: Shape) -> float:
     """Absolute difference in cubic centimetres of the volumes that two surfaces in millimetres enclose."""
     return abs(float(shape.volume) - float(target.volume)) / 1000
 
 
-def component_count(mesh: trimesh.Trimesh) -> int:
+def component_count(shape: Shape) -> int:
     """Pieces of the surface that share no edge: 1 for a sound shape, 0 where there is no surface."""
-    return int(igl.facet_components(np.asarray(mesh.faces))[0]) if len(mesh.faces) else 0
+    return kind_of(shape).pieces(shape)
 
 
-def _sample(mesh: trimesh.Trimesh, count: int, seed: np.random.SeedSequence) -> Points:
-    _require_surface(mesh)
-    return np.asarray(trimesh.sample.sample_surface(mesh, count, seed=seed)[0])
+def _sample(shape: Shape, count: int, seed: np.random.SeedSequence) -> Points:
+    _require_surface(shape)
+    return np.asarray(shape.sample(count, seed=seed))
 
 
-def _require_surface(mesh: trimesh.Trimesh) -> None:
+def _require_surface(mesh: Shape) -> None:
     if not len(mesh.faces):
         raise InputError("one of the shapes to compare has no surface; check it before asking for a distance")
 
@@ -272,3 +272,25 @@ VOLUME_DIFFERENCE = Metric(
 
 METRICS = (CHAMFER, HAUSDORFF, HAUSDORFF_95, EARTH_MOVERS, MEAN_DISTANCE, VOLUME_DIFFERENCE)
 """All that reports tell, in the order of their columns."""
+
+PLANE_DISTANCE = Metric(
+    "mean_distance",
+    "mean distance",
+    "units of length",
+    "mean of the two one-sided mean nearest-neighbour distances, not scaled",
+    MEAN_DISTANCE.measure,
+)
+AREA_DIFFERENCE = Metric(
+    "ad",
+    "AD",
+    "units of length²",
+    "absolute area difference, not scaled",
+    lambda pair: abs(float(pair.shape.volume) - float(pair.target.volume)),
+)
+
+PLANE_METRICS = (CHAMFER, HAUSDORFF, HAUSDORFF_95, EARTH_MOVERS, PLANE_DISTANCE, AREA_DIFFERENCE)
+"""The same of curves in the plane, whose unit of length is that of their atlas."""
+
+ALL_METRICS = tuple(dict.fromkeys((*METRICS, *PLANE_METRICS)))
+
+_METRICS_IN = {2: PLANE_METRICS, 3: METRICS}

@@ -8,20 +8,29 @@ from typing import Any
 import numpy as np
 
 from naisr_model.evaluation.journal import Record
-from naisr_model.evaluation.metrics import METRICS, Distances
+from naisr_model.evaluation.metrics import ALL_METRICS, METRICS, Distances
 from naisr_model.evaluation.published import Published
 
-DEFINITIONS = {metric.key: metric.definition for metric in METRICS}
+DEFINITIONS = {metric.key: metric.definition for metric in ALL_METRICS}
 """What each measured column of the record means; ``scale`` below applies to the ``_x100`` ones."""
 
 SCALE = "both shapes divided by the target's largest distance from its centre"
 
 COLUMNS = {metric.key: metric.column for metric in METRICS}
+"""Of surfaces."""
+
+ALL_COLUMNS = {metric.key: metric.column for metric in ALL_METRICS}
+
+
+def columns_of(record: Mapping[str, Any]) -> dict[str, str]:
+    """The columns that a :func:`summary`, or a record with :func:`meaning`, has."""
+    return {key: column for key, column in ALL_COLUMNS.items() if key in record}
 
 
 def summary(distances: Sequence[Distances]) -> Record:
     """How many there are, ``n``, and the mean and the median of each column."""
-    columns = {name: mean_and_median([item[name] for item in distances]) for name in COLUMNS}
+    names = list(distances[0].values if distances else COLUMNS)
+    columns = {name: mean_and_median([item[name] for item in distances]) for name in names}
     return {"n": len(distances), **columns}
 
 
@@ -33,7 +42,7 @@ def mean_and_median(values: Sequence[float]) -> Record:
 def meaning(distances: Distances) -> Record:
     """What a reader of a record must know of its columns."""
     counts = {"samples": distances.samples, "emd_samples": distances.emd_samples}
-    return {**counts, "scale": SCALE, "definitions": dict(DEFINITIONS)}
+    return {**counts, "scale": SCALE, "definitions": {name: DEFINITIONS[name] for name in distances.values}}
 
 
 def markdown_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -44,7 +53,7 @@ def markdown_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 def distance_cells(record: Mapping[str, Any]) -> list[str]:
     """Mean and median of each column of a :func:`summary`."""
-    return [pair_cell(record[name]) for name in COLUMNS]
+    return [pair_cell(record[name]) for name in columns_of(record)]
 
 
 def pair_cell(record: Mapping[str, float]) -> str:
@@ -54,15 +63,15 @@ def pair_cell(record: Mapping[str, float]) -> str:
     )
 
 
-def published_cells(row: Published) -> list[str]:
+def published_cells(row: Published, columns: Iterable[str] = COLUMNS) -> list[str]:
     """Every digit that was published, and a dash where nothing was."""
-    pairs = [getattr(row, name, None) for name in COLUMNS]
+    pairs = [getattr(row, name, None) for name in columns]
     return [f"{pair[0]:g} / {pair[1]:g}" if pair else "–" for pair in pairs]
 
 
 def definitions(report: Mapping[str, Any], published: str = "") -> str:
     """What the columns of a record with :func:`meaning` are; ``published`` says it of published rows."""
-    lines = [f"- {COLUMNS[name]}: {text}." for name, text in report["definitions"].items()]
+    lines = [f"- {ALL_COLUMNS[name]}: {text}." for name, text in report["definitions"].items()]
     lines.append(
         f"- x10²: {report['scale']}; {report['samples']:,} surface samples of each shape, "
         f"{report['emd_samples']:,} for EMD."

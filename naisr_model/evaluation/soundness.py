@@ -6,7 +6,6 @@ import itertools
 
 import numpy as np
 import torch
-import trimesh
 
 from naisr_model.atlas import Atlas
 from naisr_model.covariates import Values
@@ -14,6 +13,7 @@ from naisr_model.evaluation.metrics import component_count
 from naisr_model.evaluation.truth import EFFECT_VALUES
 from naisr_model.models.base import additive, deformable
 from naisr_model.progress import SILENT, Progress
+from naisr_model.shapes.kinds import Shape
 from naisr_model.surface.folding import folded_shares
 
 FOLDING_SHAPES, FOLDING_RESOLUTION = 40, 64
@@ -59,13 +59,13 @@ def folded_share(atlas: Atlas) -> float:
     return float(np.nanmean(folded_shares(model, covariates, both, FOLDING_RESOLUTION)))
 
 
-def mean_displacement_mm(atlas: Atlas, surface_mm: trimesh.Trimesh) -> dict[str, float]:
+def mean_displacement_mm(atlas: Atlas, surface_mm: Shape) -> dict[str, float]:
     """Length of the population's mean displacement of each covariate at z = 0, averaged over a surface.
 
     The template stands where the mean shape stands only if nobody's displacement is everybody's.
     """
     model, frame = additive(atlas.checkpoint.model()), atlas.frame
-    points = frame.to_model(trimesh.sample.sample_surface(surface_mm, 500, seed=0)[0])
+    points = frame.to_model(surface_mm.sample(500, seed=0))
     vectors = atlas.population.normalised()[~atlas.population.held_out]
     total = torch.zeros(len(atlas.covariates), len(points), frame.dim)
     for vector in torch.as_tensor(vectors, dtype=torch.float32):

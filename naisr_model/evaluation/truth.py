@@ -11,6 +11,7 @@ from naisr_model.atlas import Atlas
 from naisr_model.covariates import Covariate, Population
 from naisr_model.evaluation.held_out import aligned, known_population, synthetic
 from naisr_model.evaluation.metrics import HAUSDORFF, Pair
+from naisr_model.frames import SPACE, Extent
 from naisr_model.progress import SILENT, Progress
 
 NEIGHBOURS, NEIGHBOUR_DISTANCE = 3, 0.25
@@ -41,9 +42,10 @@ class TruthPoint:
         covariate: the one that varies along the path, or whose effect is shown.
         value: its real value.
         condition: what else defines the place, for example ``boys``; empty where nothing does.
-        volume_cm3: volume of the atlas's shape at z = 0.
-        truth_cm3: volume of the true shape without individual variation.
+        volume_cm3: volume of the atlas's shape at z = 0; of curves the area, in the unit of ``extent``.
+        truth_cm3: the same of the true shape without individual variation.
         hd_x100: Hausdorff distance from the true shape, see :data:`~.metrics.HAUSDORFF`.
+        extent: whether volumes or areas are told, and in which unit.
     """
 
     covariate: str
@@ -52,6 +54,7 @@ class TruthPoint:
     volume_cm3: float
     truth_cm3: float
     hd_x100: float
+    extent: Extent = SPACE
 
     @property
     def volume_error(self) -> float:
@@ -60,7 +63,16 @@ class TruthPoint:
 
     def to_json(self) -> dict[str, Any]:
         """Its attributes and the error."""
-        return {**asdict(self), "volume_error": self.volume_error}
+        own = {name: value for name, value in asdict(self).items() if name not in _RENAMED}
+        return {
+            **own,
+            self.extent.key(): self.volume_cm3,
+            f"truth_{self.extent.suffix}": self.truth_cm3,
+            f"{self.extent.title}_error": self.volume_error,
+        }
+
+
+_RENAMED = ("volume_cm3", "truth_cm3", "extent")
 
 
 def truth_places(atlas: Atlas) -> dict[str, list[Place]]:
@@ -95,9 +107,10 @@ def beside_truth(atlas: Atlas, place: Place, resolution: int, progress: Progress
         covariate=place.covariate,
         value=values[place.covariate],
         condition=place.condition,
-        volume_cm3=float(shape.volume / 1000),
-        truth_cm3=float(truth.volume / 1000),
+        volume_cm3=atlas.extent.of(shape),
+        truth_cm3=atlas.extent.of(truth),
         hd_x100=HAUSDORFF.measure(Pair(truth, shape)) if len(shape.faces) else float("inf"),
+        extent=atlas.extent,
     )
 
 

@@ -22,11 +22,12 @@ MOST_STEPS = 1000
 
 
 def fit_record(fit: Fit) -> dict[str, Any]:
-    """What is told of a fit, for JSON: real units, mm and cm³.
+    """What is told of a fit, for JSON: real units, mm and cm³; of curves their unit of length.
 
     ``lasting`` is None where the model shows nobody on another day.
     """
-    can = fit.individual.atlas.capabilities
+    atlas = fit.individual.atlas
+    can, extent = atlas.capabilities, atlas.extent
     return {
         "covariates": fit.covariates,
         "inferred": list(fit.inferred),
@@ -34,10 +35,10 @@ def fit_record(fit: Fit) -> dict[str, Any]:
         "alternatives": [dataclasses.asdict(one) for one in fit.alternatives],
         "is_valid": fit.is_valid,
         "remarks": list(fit.remarks),
-        "residual_mm": fit.residual_mm,
+        f"residual_{atlas.frame.unit}": fit.residual_mm,
         "lasting": fit.lasting if can.transferable else None,
-        "volume_cm3": fit.volume_cm3,
-        "volume_interval_cm3": list(fit.volume_interval_cm3),
+        extent.key(): fit.extent,
+        extent.key("interval"): list(fit.extent_interval),
         "seconds": fit.seconds,
         "latent": fit.latent.tolist(),
     }

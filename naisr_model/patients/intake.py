@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from naisr_model.atlas import Atlas
@@ -37,8 +36,10 @@ from naisr_model.data.patients import (
 )
 from naisr_model.data.remarks import Remark, gravest_first
 from naisr_model.errors import InputError
+from naisr_model.frames import SPACE, Extent
 from naisr_model.numerals import LARGEST
 from naisr_model.progress import SILENT, Progress
+from naisr_model.shapes.kinds import Shape
 
 ASTRAY_POINTS, ASTRAY_PLACES = 200, 12
 """On how many points, and at how many places along the first covariate, a scan's distance is judged."""
@@ -66,6 +67,7 @@ class Intake:
         method: of the alignment: none, icp or landmarks.
         proposal: the motion that was made; None without alignment.
         relaid_mm: how far, on average, its points were then moved onto the fit.
+        extent: what the atlas's shapes enclose, and its unit.
     """
 
     patient: PatientShape
@@ -73,6 +75,7 @@ class Intake:
     method: Method = "none"
     proposal: Proposal | None = None
     relaid_mm: float = 0.0
+    extent: Extent = SPACE
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
@@ -94,11 +97,16 @@ class Intake:
         return _told(self.method, self.proposal) + farther
 
     @property
+    def own_extent(self) -> float | None:
+        """What the patient's own shape encloses; None where it is open or a cloud of points."""
+        return self.extent.of(self.patient.mesh_mm) if self.patient.is_closed else None
+
+    @property
     def sentences(self) -> tuple[str, ...]:
         """All of it for people: what was read, the remarks and how grave they are, alignment, volume."""
         aligned = (self.alignment,) if self.alignment else ()
-        volume_cm3 = self.patient.volume_cm3
-        measured = () if volume_cm3 is None else (f"its own volume is {volume_cm3:.2f} cm³",)
+        own = self.own_extent
+        measured = () if own is None else (f"its own {self.extent.title} is {self.extent.told(own, 2)}",)
         remarks = (f"{remark.severity}: {remark.text}" for remark in self.remarks)
         return (f"read {self.patient.source}", *remarks, *aligned, *measured)
 
@@ -106,7 +114,7 @@ class Intake:
         """The same for programs; the matrix leads from the file's coordinates to the atlas frame."""
         return {
             "source": self.patient.source,
-            "volume_cm3": self.patient.volume_cm3,
+            self.extent.key(): self.own_extent,
             "remarks": [remark.to_json() for remark in self.remarks],
             "alignment": None if self.proposal is None else _distances(self),
             "file_to_atlas": self.patient.from_file.tolist(),
@@ -183,10 +191,11 @@ def read(path: Path, atlas: Atlas, label: int | str | None = None, scale: float 
     Raises:
         InputError: when the file cannot be read, or cannot be used whatever its unit and place.
     """
-    patient = repaired(_in_units(read_patient(path, label), scale), atlas.frame)
+    read_as = read_patient(path, label, atlas.frame.dim)
+    patient = repaired(_in_units(read_as, scale), atlas.frame)
     found = _found(patient, atlas)
     _refuse(path.name, (remark for remark in found if remark.topic not in ("far", "units")))
-    return Intake(patient, found)
+    return Intake(patient, found, extent=atlas.extent)
 
 
 def aligned(
@@ -214,10 +223,14 @@ def aligned(
     points = _landmarks(method, landmarks, intake.patient.space or "LPS")
     if method == "none":
         return intake
+    if atlas.frame.dim == 2:
+        raise InputError(
+            "curves are fitted where they lie; leave out --align and give them in the atlas's frame"
+        )
     _refuse(intake.patient.source, (remark for remark in intake.found if remark.topic == "units"))
     proposal = _proposal(intake.patient, atlas, known, method, points, progress)
     patient = moved(intake.patient, proposal.transform)
-    return Intake(patient, _found(patient, atlas), method, proposal)
+    return Intake(patient, _found(patient, atlas), method, proposal, extent=atlas.extent)
 
 
 def relaid(intake: Intake, atlas: Atlas, motion_mm: NDArray[np.float64]) -> Intake:
@@ -236,12 +249,15 @@ def _found(patient: PatientShape, atlas: Atlas) -> tuple[Remark, ...]:
     away_mm = _away_mm(patient.mesh_mm, atlas)
     if away_mm <= ASTRAY_SHARE * atlas.frame.scale_mm:
         return found
-    sentence = f"the shape is {away_mm:.0f} mm from the nearest of the atlas's average shapes on average"
+    away = atlas.frame.length(away_mm, 0)
+    sentence = f"the shape is {away} from the nearest of the atlas's average shapes on average"
     remedy = "align it to the atlas (icp or landmarks) before it is fitted, or check that it is such a shape"
+    if atlas.frame.dim == 2:
+        remedy = "look whether it lies as they do, and whether it is such a shape"
     return gravest_first((*found, Remark("look", "astray", sentence, remedy)))
 
 
-def _away_mm(mesh_mm: trimesh.Trimesh, atlas: Atlas) -> float:
+def _away_mm(mesh_mm: Shape, atlas: Atlas) -> float:
     """Mean distance of points of a shape to the nearest of some average shapes along the population."""
     vertices_mm = np.asarray(mesh_mm.vertices, np.float64)
     points_mm = vertices_mm[np.random.default_rng(0).permutation(len(vertices_mm))[:ASTRAY_POINTS]]

@@ -25,7 +25,7 @@ def folded_shares(
     """Share of the points near each surface where p -> p + d(p) folds, det(I + grad d) <= 0.
 
     Args:
-        model: trained, of 3D shapes.
+        model: trained.
         covariates: centred, ``[shapes, N]``.
         latents: codes, ``[shapes, L]``.
         resolution: cells along a side of the box for the surfaces.
@@ -33,15 +33,16 @@ def folded_shares(
     Returns:
         ``[shapes]``; NaN where there is no surface.
     """
-    lattice, rng = Lattice(resolution), np.random.default_rng(0)
+    dim = model.config.dim
+    lattice, rng = Lattice(resolution, dim), np.random.default_rng(0)
     shares = []
     for vector, latent in zip(covariates, latents, strict=True):
         values = evaluate_band(shape_field(model, vector, latent), lattice)
-        surface = isosurface(values, lattice, Frame((0.0,) * 3, 1.0))
+        surface = isosurface(values, lattice, Frame((0.0,) * dim, 1.0))
         if not len(surface.faces):
             shares.append(np.nan)
             continue
-        near = surface.sample(POINTS, seed=0) + rng.normal(0, SPREAD, (POINTS, 3))
+        near = surface.sample(POINTS, seed=0) + rng.normal(0, SPREAD, (POINTS, dim))
         shares.append(folded(model, near.astype(np.float32), vector, latent).mean())
     return np.array(shares)
 

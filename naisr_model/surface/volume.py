@@ -1,9 +1,12 @@
-"""The volume inside a smooth surface, from the triangles that approximate it."""
+"""What lies inside a smooth surface or curve, from the triangles or segments that approximate it."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+
+from naisr_model.shapes.curve import enclosed_area
+from naisr_model.shapes.kinds import Shape, kind_of
 
 EDGES = ((0, 1), (1, 2), (2, 0))
 """Corners of a triangle that its sides join."""
@@ -34,3 +37,14 @@ def enclosed_volume(
         for i, j in EDGES
     )
     return float(flat + (areas * sags).sum() / 3)
+
+
+def enclosed(shape: Shape) -> float:
+    """Volume inside the smooth surface, or area inside the smooth curve, through the vertices of a shape."""
+    return _ENCLOSED[kind_of(shape).dim](shape)
+
+
+_ENCLOSED = {
+    2: enclosed_area,
+    3: lambda mesh: enclosed_volume(mesh.vertices, mesh.vertex_normals, mesh.faces),
+}

@@ -102,7 +102,8 @@ class Atlases:
         atlas = self._load(path)
         if atlas.frame.dim != 3:
             raise InputError(
-                f"{path.name} is an atlas of {atlas.frame.dim}D shapes; the viewer shows 3D ones"
+                f"{path.name} is an atlas of curves in the plane, and the window shows surfaces; use the "
+                "commands, as 'naisr mesh'"
             )
         if fingerprint_of(path) != fingerprint:  # replaced meanwhile, as a training does now and then
             return self.read(path)

@@ -18,14 +18,14 @@ from naisr_model.errors import InputError
 from naisr_model.progress import SILENT, Progress
 
 if TYPE_CHECKING:  # the help of a command names the populations, and needs no meshes
-    import trimesh
-
     from naisr_model.data.align import Landmarks
+    from naisr_model.shapes.kinds import Shape
 
 POPULATIONS = MappingProxyType(
     {
         "airway": "naisr_model.data.populations.airway",
         "bodies": "naisr_model.data.populations.bodies",
+        "starman": "naisr_model.data.populations.starman",
     }
 )
 """Module of each population; importing this package imports none of them."""
@@ -53,10 +53,10 @@ class PopulationModule(Protocol):
     def visits(self, seed: int, patients: int = ...) -> Sequence[PopulationVisit]:
         """Everybody in order; the same seed gives the same people."""
 
-    def visit_shape(self, visit: Any) -> tuple[trimesh.Trimesh, Landmarks]:
-        """The surface and the landmarks of one of :meth:`visits`."""
+    def visit_shape(self, visit: Any) -> tuple[Shape, Landmarks]:
+        """The shape and the landmarks of one of :meth:`visits`."""
 
-    def true_shape(self, values: Mapping[str, float]) -> trimesh.Trimesh:
+    def true_shape(self, values: Mapping[str, float]) -> Shape:
         """The shape without individual variation."""
 
     def true_landmarks(self, values: Mapping[str, float]) -> Landmarks:

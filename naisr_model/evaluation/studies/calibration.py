@@ -104,7 +104,8 @@ class Calibration:
         found = {
             name: [visit.values[name], fit.covariates[name], *ends] for name, ends in fit.intervals.items()
         }
-        return found | {"volume": [float(mesh_mm.volume) / 1000, fit.volume_cm3, *fit.volume_interval_cm3]}
+        extent = atlas.extent
+        return found | {extent.title: [extent.of(mesh_mm), fit.extent, *fit.extent_interval]}
 
     def summarise(self, records: Sequence[Record]) -> Record:
         """The report.
@@ -114,10 +115,9 @@ class Calibration:
             the median ``width`` of the interval, the root mean square ``error`` and the ``unit``; of a
             binary covariate the share of ``undecided`` and of ``wrong`` levels instead of the latter.
         """
-        kinds = {
-            covariate.name: (covariate.unit, covariate.kind) for covariate in opened(self.atlas).covariates
-        }
-        kinds["volume"] = ("cm³", "continuous")
+        atlas = opened(self.atlas)
+        kinds = {covariate.name: (covariate.unit, covariate.kind) for covariate in atlas.covariates}
+        kinds[atlas.extent.title] = (atlas.extent.unit, "continuous")
         rows = {name: _summary([record[name] for record in records], *kinds[name]) for name in records[0]}
         return {"n": len(records), "known": self._told(), "rows": rows}
 

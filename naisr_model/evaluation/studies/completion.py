@@ -116,6 +116,8 @@ class Completion:
             InputError: when none is to be had.
         """
         atlas = opened(self.atlas)
+        if atlas.frame.dim != 3:
+            raise InputError("parts are cut from surfaces in space; this atlas holds curves in the plane")
         require_shapes(atlas, self.store, self.limit)
         rows = held_out_rows(atlas, self.limit)
         inside = [row for row in rows if atlas.population.contains(atlas.population.row(row))]

@@ -118,7 +118,9 @@ class Fitting:
             [label, f"{report['residual_mm'][way]:.3f}", f"{report['seconds'][way]:.2f}"]
             for way, label in labels.items()
         ]
-        table = markdown_table(["", "held-out residual, mm", "seconds a shape"], rows)
+        table = markdown_table(
+            ["", f"held-out residual, {opened(self.atlas).frame.unit}", "seconds a shape"], rows
+        )
         told = f"Equal or lower residual on {100 * report['no_worse']:.0f} % of the shapes"
         title = f"**{report['n']} held-out shapes, covariates known**"
         return f"{title}\n\n{table}\n\n{told}, {report['times_faster']:.0f} times faster."

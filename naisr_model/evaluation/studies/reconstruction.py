@@ -16,7 +16,7 @@ from naisr_model.evaluation.journal import Record
 from naisr_model.evaluation.metrics import Distances, compare, component_count
 from naisr_model.evaluation.published import Published
 from naisr_model.evaluation.reports import (
-    COLUMNS,
+    columns_of,
     definitions,
     distance_cells,
     markdown_table,
@@ -26,6 +26,7 @@ from naisr_model.evaluation.reports import (
 )
 from naisr_model.evaluation.soundness import components, folded_share, mean_displacement_mm, surface_places
 from naisr_model.evaluation.truth import Place, beside_truth, truth_places
+from naisr_model.frames import Extent
 from naisr_model.progress import SILENT, Progress
 
 RESOLUTION = 192
@@ -116,8 +117,8 @@ class Reconstruction:
             ``n`` shapes; ``cd_x100``, ``hd_x100``, ``vd_cm3`` and the other columns, each with ``mean`` and
             ``median``, and the same of the fits with nothing known under ``inferred``; ``truth_volume_error``
             by value of the growth path's covariate and ``effect_volume_error`` by covariate, each the signed
-            error that is largest in magnitude, as a share of the true volume; ``folded_share``, None of a
-            model that deforms no template;
+            error that is largest in magnitude, as a share of the true volume (of curves it is the area, also
+            in both names); ``folded_share``, None of a model that deforms no template;
             ``components`` as ``[min, max]``; ``growth`` and ``effects``, the single places behind the errors;
             and the definitions.
 
@@ -133,12 +134,13 @@ class Reconstruction:
         growth, effects, template = (
             [record["place"] for record in parts[part]] for part in ("growth", "effects", "template")
         )
+        enclosed = opened(self.atlas).extent.title
         looked_at = [*parts["given"], *parts["inferred"], *parts["plausible"]]
         return {
             **summary(given),
             "inferred": summary(inferred) if inferred else None,
-            "truth_volume_error": _worst((f"{place['value']:g}", place) for place in growth),
-            "effect_volume_error": _worst((place["covariate"], place) for place in effects),
+            f"truth_{enclosed}_error": _worst(enclosed, ((f"{one['value']:g}", one) for one in growth)),
+            f"effect_{enclosed}_error": _worst(enclosed, ((one["covariate"], one) for one in effects)),
             "folded_share": parts["folding"][0]["share"] if parts["folding"] else None,
             "components": _extremes(looked_at),
             "corner_components": _extremes(parts["corners"]),
@@ -158,10 +160,12 @@ class Reconstruction:
         ways = {"covariates given": report, "covariates inferred": report["inferred"]}
         sections = [
             _distance_table(ways if atlas.covariates else {"no covariates": report}, rows),
-            _truth_table("Along the growth path, z = 0", report["growth"]),
-            _truth_table("Effects of single covariates, the others at their mean, z = 0", report["effects"]),
-            _checks(report),
-            definitions(report, published.RECONSTRUCTION_NOTE if rows else ""),
+            _truth_table("Along the growth path, z = 0", report["growth"], atlas),
+            _truth_table(
+                "Effects of single covariates, the others at their mean, z = 0", report["effects"], atlas
+            ),
+            _checks(report, atlas),
+            definitions(report, published.RECONSTRUCTION_NOTES.get(atlas.name, "")),
         ]
         return "\n\n".join(filter(None, sections)) + "\n"
 
@@ -222,11 +226,11 @@ def _extremes(records: Sequence[Record]) -> list[int]:
     return [min(counts), max(counts)] if counts else []
 
 
-def _worst(places: Iterable[tuple[str, Record]]) -> dict[str, float]:
-    """The volume error of largest magnitude under each key."""
+def _worst(enclosed: str, places: Iterable[tuple[str, Record]]) -> dict[str, float]:
+    """The error of largest magnitude in what is enclosed, volume or area, under each key."""
     errors: dict[str, float] = {}
     for key, place in places:
-        errors[key] = max(errors.get(key, 0.0), float(place["volume_error"]), key=abs)
+        errors[key] = max(errors.get(key, 0.0), float(place[f"{enclosed}_error"]), key=abs)
     return errors
 
 
@@ -236,22 +240,24 @@ def _distance_table(ways: Mapping[str, Any], beside: Sequence[Published]) -> str
         for way, record in ways.items()
         if record
     ]
-    rows += [[f"published: {row.label}", *published_cells(row)] for row in beside]
-    return "**Reconstruction, mean / median**\n\n" + markdown_table(["", *COLUMNS.values()], rows)
+    columns = columns_of(next(iter(ways.values())))
+    rows += [[f"published: {row.label}", *published_cells(row, columns)] for row in beside]
+    return "**Reconstruction, mean / median**\n\n" + markdown_table(["", *columns.values()], rows)
 
 
-def _truth_table(title: str, places: Sequence[Mapping[str, Any]]) -> str:
+def _truth_table(title: str, places: Sequence[Mapping[str, Any]], atlas: Atlas) -> str:
     if not places:
         return ""
-    header = ["covariate", "value", "", "volume, cm³", "true volume, cm³", "error", "HD x10²"]
+    extent = atlas.extent
+    own, true = f"{extent.title}, {extent.unit}", f"true {extent.title}, {extent.unit}"
+    header = ["covariate", "value", "", own, true, "error", "HD x10²"]
     rows = [
         [
             place["covariate"],
             f"{place['value']:g}",
             place["condition"],
-            f"{place['volume_cm3']:.2f}",
-            f"{place['truth_cm3']:.2f}",
-            f"{100 * place['volume_error']:+.1f} %",
+            *_beside_truth(place, extent),
+            f"{100 * place[f'{extent.title}_error']:+.1f} %",
             f"{place['hd_x100']:.2f}",
         ]
         for place in places
@@ -259,7 +265,12 @@ def _truth_table(title: str, places: Sequence[Mapping[str, Any]]) -> str:
     return f"**{title}**\n\n" + markdown_table(header, rows)
 
 
-def _checks(report: Mapping[str, Any]) -> str:
+def _beside_truth(place: Mapping[str, Any], extent: Extent) -> tuple[str, str]:
+    """What the atlas's shape encloses, and what the true one does."""
+    return f"{place[extent.key()]:.2f}", f"{place[f'truth_{extent.suffix}']:.2f}"
+
+
+def _checks(report: Mapping[str, Any], atlas: Atlas) -> str:
     least, most = report["components"]
     sentences = [
         f"Connected components: {least} to {most} (1 everywhere means no ghosts).",
@@ -272,11 +283,13 @@ def _checks(report: Mapping[str, Any]) -> str:
         least, most = report["corner_components"]
         sentences.append(f"At the corners of the ranges, where no data are: {least} to {most} components.")
     if template := report["template"]:
+        extent = atlas.extent
+        own, true = (f"{number} {extent.unit}" for number in _beside_truth(template, extent))
         sentences.append(
-            f"Template: {template['volume_cm3']:.2f} cm³, true at the centre {template['truth_cm3']:.2f} cm³ "
-            f"({100 * template['volume_error']:+.1f} %), HD x10² {template['hd_x100']:.2f}."
+            f"Template: {own}, true at the centre {true} "
+            f"({100 * template[f'{extent.title}_error']:+.1f} %), HD x10² {template['hd_x100']:.2f}."
         )
     if shifts := report["mean_displacement_mm"]:
-        listed = ", ".join(f"{name} {shift:.2f} mm" for name, shift in shifts.items())
+        listed = ", ".join(f"{name} {atlas.frame.length(shift, 2)}" for name, shift in shifts.items())
         sentences.append(f"Mean displacement over the population, which centring keeps small: {listed}.")
     return " ".join(sentences)

@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import trimesh
 
 from naisr_model.atlas import Atlas, Fit
 from naisr_model.covariates import Population
@@ -37,7 +36,7 @@ from naisr_model.evaluation.journal import Record
 from naisr_model.evaluation.metrics import Distances, compare
 from naisr_model.evaluation.published import Published
 from naisr_model.evaluation.reports import (
-    COLUMNS,
+    columns_of,
     definitions,
     distance_cells,
     markdown_table,
@@ -45,7 +44,9 @@ from naisr_model.evaluation.reports import (
     published_cells,
     summary,
 )
+from naisr_model.frames import Extent
 from naisr_model.progress import SILENT, Progress
+from naisr_model.shapes.kinds import Shape
 
 WAYS = {
     "given": "fitted, covariates given",
@@ -151,18 +152,20 @@ class Transfer:
         some = next((distances for one in everything for distances in _distances([one])), None)
         if some is None:
             raise InputError("no prediction has a surface, so there is nothing to compare; train for longer")
-        return {**{name: _record(found) for name, found in asked.items() if found}, **meaning(some)}
+        extent = opened(self.atlas).extent
+        return {**{name: _record(found, extent) for name, found in asked.items() if found}, **meaning(some)}
 
     def markdown(self, report: Mapping[str, Any]) -> str:
         """The report as tables, also of one that was read back from JSON."""
-        rows = published.TRANSFER.get(opened(self.atlas).name, ()) if "visits" in report else ()
+        atlas = opened(self.atlas)
+        extent, rows = atlas.extent, published.TRANSFER.get(atlas.name, ()) if "visits" in report else ()
         sections = []
         for question, title in QUESTIONS.items():
             if question in report:
                 beside = rows if question == "visits" else ()
-                sections.append(_question_table(title, report[question], beside))
+                sections.append(_question_table(title, report[question], beside, extent))
         if "visits" in report:
-            sections.append(_patient_table(report["visits"]["cases"]))
+            sections.append(_patient_table(report["visits"]["cases"], extent))
         sections.append(definitions(report, published.TRANSFER_NOTE if rows else ""))
         return "\n\n".join(sections) + "\n"
 
@@ -203,7 +206,7 @@ def _partner(atlas: Atlas, subject: str) -> dict[str, float] | None:
     return None if synthetic(atlas) is None else next(like, None)
 
 
-def _same_person_mm(atlas: Atlas, seen: HeldOut, values: Mapping[str, float]) -> trimesh.Trimesh:
+def _same_person_mm(atlas: Atlas, seen: HeldOut, values: Mapping[str, float]) -> Shape:
     visit: Any = source_visits(atlas)[seen.subject, seen.visit]
     return aligned(atlas, *known_population(atlas).visit_shape(replace(visit, values=values)))
 
@@ -216,73 +219,82 @@ def _predictions(
     for way, fit in zip(("given", "inferred"), fits, strict=True):
         progress.check()
         person = fit.at(truth.values, extrapolate=True)
-        ways[way] = _measured(person.surface, person.volume_interval_cm3, truth)
+        ways[way] = _measured(atlas.extent, person.surface, person.extent_interval, truth)
     for way, code in (("kept", fits[0].latent), ("average", None)):
         surface = atlas.shape(truth.values, code, extrapolate=True, progress=progress.quiet)
-        ways[way] = _measured(surface, None, truth)
+        ways[way] = _measured(atlas.extent, surface, None, truth)
     return {
         "subject": seen.subject,
         "fitted_visit": seen.visit,
         "fitted_values": seen.values,
         "visit": truth.visit,
         "values": truth.values,
-        "measured_cm3": float(truth.mesh_mm.volume) / 1000,
+        f"measured_{atlas.extent.suffix}": atlas.extent.of(truth.mesh_mm),
         **ways,
     }
 
 
 def _measured(
-    surface_mm: trimesh.Trimesh, interval_cm3: tuple[float, float] | None, truth: HeldOut
+    extent: Extent, surface_mm: Shape, interval: tuple[float, float] | None, truth: HeldOut
 ) -> Record:
     """One way to predict a shape: the distances from the truth are missing where nothing was predicted."""
     distances = compare(truth.mesh_mm, surface_mm) if len(surface_mm.faces) else None
     return {
-        "volume_cm3": float(surface_mm.volume) / 1000,
-        "interval_cm3": interval_cm3 and list(interval_cm3),
+        extent.key(): extent.of(surface_mm),
+        f"interval_{extent.suffix}": interval and list(interval),
         "distances": distances and distances.to_json(),
     }
 
 
-def _record(cases: Sequence[Record]) -> Record:
-    ways = {}
+def _record(cases: Sequence[Record], extent: Extent) -> Record:
+    ways, measured, interval = {}, f"measured_{extent.suffix}", f"interval_{extent.suffix}"
     for way in WAYS:
-        sure = [(case["measured_cm3"], ends) for case in cases if (ends := case[way]["interval_cm3"])]
+        sure = [(case[measured], ends) for case in cases if (ends := case[way][interval])]
         held = [low <= volume <= high for volume, (low, high) in sure]
         ways[way] = {
             **summary(_distances([case[way] for case in cases])),
             "held": float(np.mean(held)) if held else None,
-            "width_cm3": float(np.median([high - low for _, (low, high) in sure])) if sure else None,
+            f"width_{extent.suffix}": float(np.median([high - low for _, (low, high) in sure]))
+            if sure
+            else None,
         }
     people = len({case["subject"] for case in cases})
-    return {"n": len(cases), "subjects": people, **ways, "cases": [_volumes(case) for case in cases]}
+    return {"n": len(cases), "subjects": people, **ways, "cases": [_extents(case, extent) for case in cases]}
 
 
 def _distances(predictions: Sequence[Record]) -> list[Distances]:
     return [Distances.from_json(one["distances"]) for one in predictions if one["distances"]]
 
 
-def _volumes(case: Record) -> Record:
+def _extents(case: Record, extent: Extent) -> Record:
     """A case without its distances."""
-    ways = {way: {key: case[way][key] for key in ("volume_cm3", "interval_cm3")} for way in WAYS}
+    keys = (extent.key(), f"interval_{extent.suffix}")
+    ways = {way: {key: case[way][key] for key in keys} for way in WAYS}
     return {**case, **ways}
 
 
-def _question_table(title: str, record: Mapping[str, Any], beside: Sequence[Published]) -> str:
-    rows = [[label, *distance_cells(record[way]), *_interval(record[way])] for way, label in WAYS.items()]
-    rows += [[f"published: {row.label}", *published_cells(row), "–", "–"] for row in beside]
-    header = ["", *COLUMNS.values(), "volume inside its 95 % interval", "median width of that, cm³"]
+def _question_table(
+    title: str, record: Mapping[str, Any], beside: Sequence[Published], extent: Extent
+) -> str:
+    rows = [
+        [label, *distance_cells(record[way]), *_interval(record[way], extent)] for way, label in WAYS.items()
+    ]
+    columns = columns_of(record["given"])
+    rows += [[f"published: {row.label}", *published_cells(row, columns), "–", "–"] for row in beside]
+    inside, width = f"{extent.title} inside its 95 % interval", f"median width of that, {extent.unit}"
+    header = ["", *columns.values(), inside, width]
     size = f"{record['n']} shapes of {record['subjects']} held-out subjects, mean / median"
     return f"**{title}: {size}**\n\n{markdown_table(header, rows)}"
 
 
-def _interval(record: Mapping[str, Any]) -> tuple[str, str]:
+def _interval(record: Mapping[str, Any], extent: Extent) -> tuple[str, str]:
     if record["held"] is None:
         return "–", "–"
-    width = record["width_cm3"]
+    width = record[f"width_{extent.suffix}"]
     return f"{100 * record['held']:.0f} %", f"{width:,.0f}" if width > 100 else f"{width:.3g}"
 
 
-def _patient_table(cases: Sequence[Mapping[str, Any]]) -> str:
+def _patient_table(cases: Sequence[Mapping[str, Any]], extent: Extent) -> str:
     """The subject with most visits, as the paper's patient table."""
     own = [case for case in cases if case["subject"] == cases[0]["subject"]]
     names = list(own[0]["values"])
@@ -291,17 +303,24 @@ def _patient_table(cases: Sequence[Mapping[str, Any]]) -> str:
         [
             case["visit"],
             *(f"{case['values'][name]:.4g}" for name in names),
-            f"{case['measured_cm3']:.1f}",
-            *(_volume_cell(case[way]) for way in WAYS),
+            _cell(case[f"measured_{extent.suffix}"], extent),
+            *(_extent_cell(case[way], extent) for way in WAYS),
         ]
         for case in own
     ]
     fitted = ", ".join(f"{name} {first[name]:.4g}" for name in names)
-    header = ["visit", *names, "measured, cm³", *(f"{label}, cm³" for label in WAYS.values())]
-    title = f"**Volumes of {own[0]['subject']}, fitted at visit {own[0]['fitted_visit']} ({fitted})**"
+    header = ["visit", *names, *(f"{label}, {extent.unit}" for label in ("measured", *WAYS.values()))]
+    whose = f"{own[0]['subject']}, fitted at visit {own[0]['fitted_visit']} ({fitted})"
+    title = f"**{extent.title.capitalize()}s of {whose}**"
     return f"{title}\n\n{markdown_table(header, rows)}"
 
 
-def _volume_cell(way: Mapping[str, Any]) -> str:
-    ends = way["interval_cm3"]
-    return f"{way['volume_cm3']:.1f}" + (f" ({ends[0]:.1f} to {ends[1]:.1f})" if ends else "")
+def _extent_cell(way: Mapping[str, Any], extent: Extent) -> str:
+    ends = way[f"interval_{extent.suffix}"]
+    interval = f" ({' to '.join(_cell(end, extent) for end in ends)})" if ends else ""
+    return _cell(way[extent.key()], extent) + interval
+
+
+def _cell(value: float, extent: Extent) -> str:
+    """A number of a table whose header has the unit."""
+    return extent.told(value).removesuffix(f" {extent.unit}")

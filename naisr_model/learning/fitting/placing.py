@@ -45,7 +45,7 @@ class Placing:
     """Where a patient is explained best.
 
     Attributes:
-        motion: rigid, 4x4, from where it lies.
+        motion: rigid, ``[dim + 1, dim + 1]``, from where it lies.
         moved: mean distance by which the motion carries its points.
         before: mean distance of its points to the fitted surface as it lies.
         after: the same once it is moved, code and covariates following.
@@ -62,9 +62,9 @@ class _Place:
     """Somewhere on the way.
 
     Attributes:
-        motion: made so far, 4x4.
+        motion: made so far, ``[dim + 1, dim + 1]``.
         parameters: see :class:`~naisr_model.learning.fitting.least_squares.Problem`, ``[P]``.
-        points: of the sample, moved, ``[n, 3]``.
+        points: of the sample, moved, ``[n, dim]``.
         rows: the residuals there.
     """
 
@@ -91,7 +91,7 @@ def placing_of(problem: Problem, sample: Sample, parameters: Vector, progress: P
     Raises:
         Cancelled: when nobody waits for it any more.
     """
-    start = here = _place(problem, sample, np.eye(4), parameters)
+    start = here = _place(problem, sample, np.eye(sample.points.shape[1] + 1), parameters)
     damping = FIRST_DAMPING
     for _ in range(STEPS):
         progress.check()
@@ -112,7 +112,7 @@ def placing_of(problem: Problem, sample: Sample, parameters: Vector, progress: P
 
 
 def _place(problem: Problem, sample: Sample, motion: Vector, parameters: Vector) -> _Place:
-    points = sample.points.double().numpy() @ motion[:3, :3].T + motion[:3, 3]
+    points = sample.points.double().numpy() @ motion[:-1, :-1].T + motion[:-1, -1]
     lies = Sample(torch.as_tensor(points).to(sample.points), sample.distances)
     return _Place(motion, parameters, points, evaluate(problem, lies, parameters))
 
@@ -121,19 +121,34 @@ def _stepped(problem: Problem, sample: Sample, here: _Place, damping: float) -> 
     """A damped step of motion and parameters together."""
     rows, middle = here.rows, here.points.mean(axis=0)
     near = linearise(problem, rows, here.parameters, rows.noise)
-    by_motion = np.hstack([np.cross(here.points - middle, rows.by_place), rows.by_place])
+    arms = here.points - middle
+    by_motion = np.hstack([_torques(arms, rows.by_place), rows.by_place])
+    free = by_motion.shape[1]
     weighted = by_motion.T * weights_of(problem, rows.residuals, rows.noise)
     across = weighted @ rows.jacobian
     hessian = np.block([[weighted @ by_motion, across], [across.T, near.hessian]])
     gradient = np.concatenate([weighted @ rows.residuals, near.gradient])
     step = -np.linalg.solve(hessian + damping * np.diag(np.diag(hessian)), gradient)
-    motion = _rigid(step[:3], step[3:6], middle) @ here.motion
-    return _place(problem, sample, motion, problem.bounded(here.parameters + step[6:]))
+    turn, shift = np.split(step[:free], [free - len(middle)])
+    motion = _rigid(turn, shift, middle) @ here.motion
+    return _place(problem, sample, motion, problem.bounded(here.parameters + step[free:]))
+
+
+def _torques(arms: Vector, forces: Vector) -> Vector:
+    """``arms x forces``, ``[n, 3]``; in the plane the one component across it, ``[n, 1]``."""
+    if arms.shape[1] == 3:
+        return np.cross(arms, forces)
+    return arms[:, :1] * forces[:, 1:] - arms[:, 1:] * forces[:, :1]
 
 
 def _rigid(turn: Vector, shift: Vector, middle: Vector) -> Vector:
-    """A turn (rotation vector) about ``middle``, then a shift, as a 4x4 matrix."""
-    motion = np.eye(4)
-    motion[:3, :3] = Rotation.from_rotvec(turn).as_matrix()
-    motion[:3, 3] = middle + shift - motion[:3, :3] @ middle
+    """A turn about ``middle``, then a shift, as a matrix ``[dim + 1, dim + 1]``.
+
+    The turn is a rotation vector, in the plane its one component across it.
+    """
+    dim = len(middle)
+    across = np.array([0.0, 0.0, turn[0]]) if dim == 2 else turn
+    motion = np.eye(dim + 1)
+    motion[:dim, :dim] = Rotation.from_rotvec(across).as_matrix()[:dim, :dim]
+    motion[:dim, dim] = middle + shift - motion[:dim, :dim] @ middle
     return motion

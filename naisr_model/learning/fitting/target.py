@@ -7,14 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-import trimesh
 from numpy.typing import ArrayLike, NDArray
 from torch import Tensor
 
-from naisr_model.data.meshes import is_closed
 from naisr_model.data.samples import sample_shape
+from naisr_model.data.sound import is_closed
 from naisr_model.errors import InputError
 from naisr_model.frames import Frame
+from naisr_model.shapes.kinds import SHAPES, Shape
 
 SURFACE_SAMPLES, NEAR_SAMPLES = 12_000, 6_000
 FEWEST_POINTS = 30
@@ -38,13 +38,13 @@ class Target:
     space: NDArray[np.float32]
 
 
-def target_of(shape: trimesh.Trimesh | ArrayLike, frame: Frame, seed: int = 0) -> Target:
-    """Sample a mesh, watertight or open, or take a cloud of points; both in millimetres of the atlas frame.
+def target_of(shape: Shape | ArrayLike, frame: Frame, seed: int = 0) -> Target:
+    """Sample a mesh, watertight or open, or a curve, or take points; in millimetres of the atlas frame.
 
     Raises:
         InputError: when there are too few points or coordinates that are no numbers.
     """
-    mesh = shape if isinstance(shape, trimesh.Trimesh) else None
+    mesh = shape if isinstance(shape, SHAPES) else None
     points_mm = np.asarray(shape if mesh is None else mesh.vertices, dtype=np.float64)
     if points_mm.ndim != 2 or points_mm.shape[1] != frame.dim:
         raise InputError(f"the points have shape {points_mm.shape}; give [n, {frame.dim}] in millimetres")

@@ -19,6 +19,7 @@ from naisr_model.files import checked_place, forget_unfinished, replacing
 from naisr_model.learning.training.residual import residual_latents
 from naisr_model.learning.training.task import State, Task
 from naisr_model.models.base import DeformableModel, deformable
+from naisr_model.shapes.kinds import kind_of
 from naisr_model.surface.fields import template_field
 from naisr_model.surface.folding import folded_shares
 from naisr_model.surface.isosurface import isosurface
@@ -120,23 +121,24 @@ def _require_undamaged(path: Path) -> None:
 
 
 def keep_template(state: State, task: Task) -> None:
-    """Write the template as a mesh when one of the chosen epochs has just ended."""
+    """Write the template as a file when one of the chosen epochs has just ended."""
     epoch, rest = divmod(state.iteration, task.epoch_iterations)
-    if rest or epoch not in task.config.template_epochs or task.store.frame.dim != 3:
+    if rest or epoch not in task.config.template_epochs:
         return
-    lattice = Lattice(64)
-    mesh = isosurface(
+    lattice = Lattice(64, task.store.frame.dim)
+    shape = isosurface(
         evaluate_band(template_field(deformable(state.model)), lattice), lattice, task.store.frame
     )
-    if len(mesh.faces):
-        path = task.folder / "templates" / f"epoch_{epoch:05d}.ply"
-        with replacing(path) as temporary, temporary.open("wb") as file:
-            mesh.export(file, file_type="ply")
+    if len(shape.faces):
+        kind = kind_of(shape)
+        path = task.folder / "templates" / f"epoch_{epoch:05d}{Path(kind.stored).suffix}"
+        with replacing(path) as temporary:
+            temporary.write_bytes(kind.written(shape))
 
 
 def measured(state: State, task: Task) -> dict[str, float]:
     """Of surfaces that a template is deformed to, the share that folds."""
-    if task.store.frame.dim != 3 or not isinstance(state.model, DeformableModel):
+    if not isinstance(state.model, DeformableModel):
         return {}
     share = _folded_share(state.model, state, task)
     return {} if np.isnan(share) else {"folded_share": share}
