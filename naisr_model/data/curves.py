@@ -7,7 +7,8 @@ upwards; drawings and images, where it grows downwards, are turned over.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -38,6 +39,7 @@ FLAT_SHARE = 1e-4
 UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "um": 0.001, "µm": 0.001}
 """Units of length that files state, in millimetres."""
 
+_START = 4096
 _IMAGES = (b"\x89PNG\r\n\x1a\n", b"II*\0", b"MM\0*")
 
 Points = NDArray[np.float64]
@@ -65,18 +67,22 @@ def is_curve_file(path: str | Path) -> bool:
     if content.startswith(_IMAGES) or formats.is_drawing(plain):
         return True
     is_text = path.suffix.lower() in POINT_ENDINGS and not formats.format_of(plain, path.suffix.lower()[1:])
-    return is_text and _is_flat_text(path)
+    return is_text and _is_flat_text(plain)
 
 
-def _is_flat_text(path: Path) -> bool:
-    try:
-        lines, _ = sheets.read_lines(path, comment="#")
-    except InputError:
-        return False
-    if not lines:
-        return False
-    names = [sheets.split_title(cell)[0].lower() for cell in lines[0].cells]
+def _is_flat_text(content: bytes) -> bool:
+    """Whether the first line names x and y and no z, or holds two cells."""
+    names = [name for name, _ in _header(content)]
     return ({"x", "y"} <= set(names) and "z" not in names) or (len(names) == 2 and "x" not in names)
+
+
+def _header(content: bytes) -> list[tuple[str, str]]:
+    """The cells of a text's first line as names and units, small letters."""
+    lines = (line.strip() for line in content[:_START].decode("utf-8", "replace").splitlines())
+    first = next((line for line in lines if line and not line.startswith("#")), "")
+    cells = re.split(r"\s*[,;\t|]\s*|\s+(?![\[(])", first)
+    titles = (sheets.split_title(cell.strip('"')) for cell in cells)
+    return [(name.lower(), unit.lower()) for name, unit in titles]
 
 
 def sound_curve(path: str | Path, label: int | str | None = None) -> CurveFile:
@@ -100,7 +106,7 @@ def sound_curve(path: str | Path, label: int | str | None = None) -> CurveFile:
         drawing = read_drawing(path.name, formats.plain(content))
         loops, unit_mm, said = drawing.loops, UNITS_MM.get(drawing.unit), _unit_remark(drawing.unit)
     else:
-        loops, unit = _text_loops(path)
+        loops, unit = _text_loops(path, dict(_header(formats.plain(content))))
         unit_mm, said = UNITS_MM.get(unit), _unit_remark(unit)
     curve, remarks = _sound(path.name, [(unit_mm or 1.0) * loop for loop in loops])
     return CurveFile(curve, (said, *remarks), unit_mm)
@@ -115,17 +121,13 @@ def _unit_remark(unit: str) -> Remark:
     return Remark("fine", "units", "the file states no unit of length; its numbers are taken as they are")
 
 
-def _text_loops(path: Path) -> tuple[list[Points], str]:
-    points = read_points(path, "xy")
-    lines, _ = sheets.read_lines(path, comment="#")
-    titles = [sheets.split_title(cell) for cell in lines[0].cells]
-    names = [name.lower() for name, _ in titles]
-    unit = titles[names.index("x")][1].lower() if "x" in names else ""
-    if "piece" not in names:
-        return [points], unit
-    column = names.index("piece")
-    pieces = np.array([line.cells[column] for line in lines[1:]])
-    return [points[pieces == piece] for piece in dict.fromkeys(pieces.tolist())], unit
+def _text_loops(path: Path, units: Mapping[str, str]) -> tuple[list[Points], str]:
+    """Each polygon, and the unit of a text whose columns, if they are named, have these units."""
+    unit = units.get("x", "")
+    if "piece" not in units:
+        return [read_points(path, ("x", "y"))], unit
+    rows = read_points(path, ("x", "y", "piece"))
+    return [rows[rows[:, 2] == piece, :2] for piece in np.unique(rows[:, 2])], unit
 
 
 def labels_in(path: Path) -> dict[int, str]:

@@ -19,7 +19,7 @@ POINT_ENDINGS = {".csv", ".txt", ".xyz"}
 NUMBERS = {2: "two", 3: "three"}
 
 
-def read_points(path: str | Path, axes: str = "xyz") -> NDArray[np.float64]:
+def read_points(path: str | Path, axes: Sequence[str] = ("x", "y", "z")) -> NDArray[np.float64]:
     """Read a text file of points: a column for each axis, or a header that names the axes among others.
 
     Any text that :mod:`naisr_model.data.sheets` reads; lines that begin with # are skipped.
@@ -75,7 +75,7 @@ def _coordinates(path: Path, cells: list[list[str]], numbers: list[int]) -> NDAr
     return points
 
 
-def _columns(path: Path, first: Sequence[str], axes: str) -> tuple[int, ...]:
+def _columns(path: Path, first: Sequence[str], axes: Sequence[str]) -> tuple[int, ...]:
     """Where the axes stand if the first line is a header; empty if it is numbers."""
     if all(_is_number(part) for part in first[: len(axes)]):
         return ()

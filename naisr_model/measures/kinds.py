@@ -11,7 +11,9 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike, NDArray
 
+from naisr_model.errors import InputError
 from naisr_model.measures.tubes import Tube, tube_of
+from naisr_model.shapes.kinds import kind_of
 from naisr_model.surface.volume import enclosed_volume
 
 
@@ -42,7 +44,15 @@ class Surface:
 
 
 def surface_of(mesh: trimesh.Trimesh) -> Surface:
-    """A mesh in millimetres, with stations of its own where it is tube-like."""
+    """A mesh in millimetres, with stations of its own where it is tube-like.
+
+    Raises:
+        InputError: for a curve in the plane.
+    """
+    if kind_of(mesh).dim != 3:
+        raise InputError(
+            "surfaces alone are measured so; the area of a curve is told by 'naisr fit' and 'mesh'"
+        )
     return Surface(mesh.vertices, np.asarray(mesh.faces), bool(mesh.is_watertight), tube_of(mesh))
 
 
