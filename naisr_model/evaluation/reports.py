@@ -11,7 +11,7 @@ from naisr_model.evaluation.journal import Record
 from naisr_model.evaluation.metrics import ALL_METRICS, METRICS, Distances
 from naisr_model.evaluation.published import Published
 
-DEFINITIONS = {metric.key: metric.definition for metric in ALL_METRICS}
+DEFINITIONS = {metric.key: metric.definition for metric in METRICS}
 """What each measured column of the record means; ``scale`` below applies to the ``_x100`` ones."""
 
 SCALE = "both shapes divided by the target's largest distance from its centre"
@@ -20,6 +20,7 @@ COLUMNS = {metric.key: metric.column for metric in METRICS}
 """Of surfaces."""
 
 ALL_COLUMNS = {metric.key: metric.column for metric in ALL_METRICS}
+ALL_DEFINITIONS = {metric.key: metric.definition for metric in ALL_METRICS}
 
 
 def columns_of(record: Mapping[str, Any]) -> dict[str, str]:
@@ -42,7 +43,7 @@ def mean_and_median(values: Sequence[float]) -> Record:
 def meaning(distances: Distances) -> Record:
     """What a reader of a record must know of its columns."""
     counts = {"samples": distances.samples, "emd_samples": distances.emd_samples}
-    return {**counts, "scale": SCALE, "definitions": {name: DEFINITIONS[name] for name in distances.values}}
+    return {**counts, "scale": SCALE, "definitions": {name: ALL_DEFINITIONS[name] for name in distances.values}}
 
 
 def markdown_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
