@@ -140,7 +140,7 @@ class Distances:
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> Distances:
         """Of what :meth:`to_json` gave."""
-        values = {metric.key: record[metric.key] for metric in ALL_METRICS if metric.key in record}
+        values = {metric.key: record[metric.key] for metric in all_metrics() if metric.key in record}
         return cls(values, record["samples"], record["emd_samples"])
 
 
@@ -165,7 +165,7 @@ def compare(
         InputError: when either has no faces.
     """
     pair = Pair(target, shape, samples, emd_samples, seed)
-    asked = _METRICS_IN[kind_of(target).dim]
+    asked = metrics_in(kind_of(target).dim)
     return Distances({metric.key: metric.measure(pair) for metric in asked}, samples, emd_samples)
 
 
@@ -291,6 +291,12 @@ AREA_DIFFERENCE = Metric(
 PLANE_METRICS = (CHAMFER, HAUSDORFF, HAUSDORFF_95, EARTH_MOVERS, PLANE_DISTANCE, AREA_DIFFERENCE)
 """The same of curves in the plane, whose unit of length is that of their atlas."""
 
-ALL_METRICS = tuple(dict.fromkeys((*METRICS, *PLANE_METRICS)))
 
-_METRICS_IN = {2: PLANE_METRICS, 3: METRICS}
+def metrics_in(dim: int) -> tuple[Metric, ...]:
+    """All that is told of shapes of so many dimensions."""
+    return PLANE_METRICS if dim == 2 else METRICS
+
+
+def all_metrics() -> tuple[Metric, ...]:
+    """Those of surfaces, then those that curves alone have."""
+    return tuple(dict.fromkeys((*METRICS, *PLANE_METRICS)))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from naisr_model.evaluation.journal import Record
-from naisr_model.evaluation.metrics import ALL_METRICS, METRICS, Distances
+from naisr_model.evaluation.metrics import METRICS, Distances, all_metrics
 from naisr_model.evaluation.published import Published
 
 DEFINITIONS = {metric.key: metric.definition for metric in METRICS}
@@ -19,8 +19,8 @@ SCALE = "both shapes divided by the target's largest distance from its centre"
 COLUMNS = {metric.key: metric.column for metric in METRICS}
 """Of surfaces."""
 
-ALL_COLUMNS = {metric.key: metric.column for metric in ALL_METRICS}
-ALL_DEFINITIONS = {metric.key: metric.definition for metric in ALL_METRICS}
+ALL_COLUMNS = {metric.key: metric.column for metric in all_metrics()}
+ALL_DEFINITIONS = {metric.key: metric.definition for metric in all_metrics()}
 
 
 def columns_of(record: Mapping[str, Any]) -> dict[str, str]:
@@ -43,7 +43,8 @@ def mean_and_median(values: Sequence[float]) -> Record:
 def meaning(distances: Distances) -> Record:
     """What a reader of a record must know of its columns."""
     counts = {"samples": distances.samples, "emd_samples": distances.emd_samples}
-    return {**counts, "scale": SCALE, "definitions": {name: ALL_DEFINITIONS[name] for name in distances.values}}
+    told = {name: ALL_DEFINITIONS[name] for name in distances.values}
+    return {**counts, "scale": SCALE, "definitions": told}
 
 
 def markdown_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
