@@ -16,7 +16,7 @@ from naisr_model.evaluation import published
 from naisr_model.evaluation.held_out import opened
 from naisr_model.evaluation.journal import Record
 from naisr_model.evaluation.reports import (
-    COLUMNS,
+    columns_of,
     definitions,
     distance_cells,
     markdown_table,
@@ -109,13 +109,13 @@ class Comparison:
 
     def markdown(self, report: Mapping[str, Any]) -> str:
         """The tables of a report, also of one that was read back from JSON, with units and definitions."""
-        atlases, name = report["atlases"], opened(self.atlases[0]).name
-        beside = published.RECONSTRUCTION.get(name, ())
+        atlases, first = report["atlases"], opened(self.atlases[0])
+        beside = published.RECONSTRUCTION.get(first.name, ())
         sections = [
             _distances(atlases, beside),
-            _truths(atlases),
+            _truths(atlases, first.extent.title),
             _sizes(atlases),
-            definitions(atlases[0]["report"], published.RECONSTRUCTION_NOTE if beside else ""),
+            definitions(atlases[0]["report"], published.RECONSTRUCTION_NOTES.get(first.name, "")),
         ]
         return "\n\n".join(filter(None, sections)) + "\n"
 
@@ -153,12 +153,13 @@ def _distances(atlases: Sequence[Mapping[str, Any]], beside: Sequence[published.
             if found:
                 label = f"{atlas['label']}, {told if knows else 'no covariates'}, {found['n']} shapes"
                 rows.append([label, *distance_cells(found)])
-    rows += [[f"published: {row.label}", *published_cells(row)] for row in beside]
-    return "**Held-out shapes refitted, mean / median**\n\n" + markdown_table(["", *COLUMNS.values()], rows)
+    columns = columns_of(atlases[0]["report"])
+    rows += [[f"published: {row.label}", *published_cells(row, columns)] for row in beside]
+    return "**Held-out shapes refitted, mean / median**\n\n" + markdown_table(["", *columns.values()], rows)
 
 
-def _truths(atlases: Sequence[Mapping[str, Any]]) -> str:
-    """Mean and largest error of volumes and mean HD, along the growth path and of single covariates."""
+def _truths(atlases: Sequence[Mapping[str, Any]], enclosed: str) -> str:
+    """Mean and largest error of volumes, or of areas, and mean HD, along the growth path and of single covariates."""
     names = dict.fromkeys(place["covariate"] for atlas in atlases for place in atlas["report"]["effects"])
     header = ["", "growth path", *[f"{name} alone" for name in names], "template"]
     rows = []
@@ -166,19 +167,21 @@ def _truths(atlases: Sequence[Mapping[str, Any]]) -> str:
         report = atlas["report"]
         own = [[place for place in report["effects"] if place["covariate"] == name] for name in names]
         template = [report["template"]] if report["template"] else []
-        rows.append([atlas["label"], *map(_errors, (report["growth"], *own, template))])
+        rows.append(
+            [atlas["label"], *(_errors(each, enclosed) for each in (report["growth"], *own, template))]
+        )
     if not any(atlas["report"]["growth"] for atlas in atlases):
         return ""
     return (
-        "**Beside the truth, z = 0: mean / largest error of the volume, and mean HD x10²**\n\n"
+        f"**Beside the truth, z = 0: mean / largest error of the {enclosed}, and mean HD x10²**\n\n"
         + markdown_table(header, rows)
     )
 
 
-def _errors(places: Sequence[Mapping[str, Any]]) -> str:
+def _errors(places: Sequence[Mapping[str, Any]], enclosed: str) -> str:
     if not places:
         return "–"
-    errors = [abs(place["volume_error"]) for place in places]
+    errors = [abs(place[f"{enclosed}_error"]) for place in places]
     hausdorff = np.mean([place["hd_x100"] for place in places])
     return f"{100 * np.mean(errors):.1f} / {100 * max(errors):.1f} %, {hausdorff:.2f}"
 
