@@ -159,7 +159,7 @@ def _distances(atlases: Sequence[Mapping[str, Any]], beside: Sequence[published.
 
 
 def _truths(atlases: Sequence[Mapping[str, Any]], enclosed: str) -> str:
-    """Mean and largest error of volumes, or of areas, and mean HD, along the growth path and of single covariates."""
+    """Mean and largest error of volumes or areas, mean HD, along the growth path and of single covariates."""
     names = dict.fromkeys(place["covariate"] for atlas in atlases for place in atlas["report"]["effects"])
     header = ["", "growth path", *[f"{name} alone" for name in names], "template"]
     rows = []
