@@ -53,9 +53,7 @@ class Canvas(QtInteractor):
     """
 
     drawn = Signal(int)  # the picture is on its way to the screen; how many sub-plots were drawn anew
-    clicked = Signal(
-        int, object
-    )  # a short click, no double one: which sub-plot, and the point (mm) of its surface
+    clicked = Signal(int, object)  # a short click, no double one: which sub-plot, and the point (mm) there
     chosen = Signal(int)  # a short click on a sub-plot, beside its surface too
     opened = Signal(int)  # a double click on a sub-plot, after that
     hovered = Signal(int, object)  # the mouse rests: over which sub-plot, and the Hit there or None
@@ -325,6 +323,8 @@ class Canvas(QtInteractor):
 
     def release(self) -> None:
         """Close the render window for good; nothing is drawn afterwards."""
+        for waiting in (self._rest, self._single):
+            waiting.stop()
         self.iren.interactor.RemoveObserver(self._requests)
         self.close()
         self._forget_context()  # Qt deletes context and surface; Python must not know them any longer
