@@ -113,7 +113,8 @@ class Atlas:
 
     Everywhere, ``covariates`` maps names to values in real units (``{"age": 120}`` in the unit of
     ``atlas.covariates``; a binary covariate is -1 or +1, or between them); what is left out is at
-    the population centre. ``latent`` is a code z ``[L]``; left out, it is 0, the population
+    the population centre; that of a binary one has to be given where shapes there are not known, as with
+    A-SDF. ``latent`` is a code z ``[L]``; left out, it is 0, the population
     average. Surfaces are ``trimesh.Trimesh`` in millimetres with outward faces, so their
     ``volume / 1000`` is in cm³; where no surface exists they have no faces. An atlas in the plane gives a
     :class:`~naisr_model.shapes.curve.Curve` in their place, in the unit of its frame. ``resolution`` is the
@@ -526,6 +527,12 @@ class Atlas:
 
     def _vector(self, covariates: Values, extrapolate: bool) -> Tensor:
         values = self.complete(covariates, extrapolate=extrapolate)
+        binary = [one for one in self.covariates if one.kind == "binary" and one.name not in covariates]
+        if binary and not self.capabilities.vanishes_at_centre:
+            name, levels = binary[0].name, " or ".join(binary[0].levels)
+            raise InputError(
+                f"{self.model_title} knows no shape between the levels of '{name}'; give {levels}"
+            )
         return self._model.tensor(normalised_vector(self.covariates, values))
 
     def _latent(self, latent: ArrayLike | None) -> Tensor:

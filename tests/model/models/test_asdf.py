@@ -7,6 +7,7 @@ import pytest
 import torch
 from eggs import egg
 
+from naisr_model import cli
 from naisr_model.atlas import Atlas
 from naisr_model.checkpoint import load
 from naisr_model.config import SirenConfig
@@ -101,3 +102,14 @@ def test_the_atlas_knows_what_it_is_not(atlas, egg_asdf):
     ):
         with pytest.raises(InputError, match="A-SDF"):
             ask()
+
+
+def test_a_binary_covariate_has_to_be_given_as_nothing_is_known_between_its_levels(
+    egg_asdf, tmp_path, capsys
+):
+    out = tmp_path / "egg.stl"
+    assert cli.main(["mesh", str(egg_asdf), "--set", "age=5", "--out", str(out)]) == 2
+    assert "A-SDF knows no shape between the levels of 'sex'; give F or M" in capsys.readouterr().err
+    assert not out.exists()
+    assert cli.main(["mesh", str(egg_asdf), "--set", "age=5,sex=M", "--out", str(out)]) == 0
+    assert out.exists()
