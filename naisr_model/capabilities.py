@@ -4,6 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+CAN = {
+    "implicit": "surfaces at any resolution",
+    "deformable": "points of different shapes correspond",
+    "disentangleable": "the effect of each covariate alone can be seen",
+    "additive": "the covariates' displacements add up",
+    "evolvable": "shapes can be followed along covariates",
+    "transferable": "a patient can be seen on another day",
+    "stepwise": "deformations are followed step by step",
+    "invertible": "deformations cannot fold",
+    "has_template": "there is a template that all shapes are deformed from",
+    "vanishes_at_centre": "at the centre of the covariates every shape is the template",
+}
+"""What each capability means to whoever uses an atlas."""
+
 
 @dataclass(frozen=True)
 class Capabilities:
@@ -38,3 +52,8 @@ class Capabilities:
     def trackable(self) -> bool:
         """Whether the template's surface can be carried to a shape from tables of displacements."""
         return self.deformable and self.additive and self.vanishes_at_centre
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """What the model can do, in words."""
+        return tuple(told for name, told in CAN.items() if getattr(self, name))

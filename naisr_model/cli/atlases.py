@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -17,20 +16,6 @@ from naisr_model.files import replacing
 if TYPE_CHECKING:
     from naisr_model.covariates import Covariate, Population  # loads numpy, which '--help' does not need
 
-
-CAN = {
-    "implicit": "surfaces at any resolution",
-    "deformable": "points of different shapes correspond",
-    "disentangleable": "the effect of each covariate alone can be seen",
-    "additive": "the covariates' displacements add up",
-    "evolvable": "shapes can be followed along covariates",
-    "transferable": "a patient can be seen on another day",
-    "stepwise": "deformations are followed step by step",
-    "invertible": "deformations cannot fold",
-    "has_template": "there is a template that all shapes are deformed from",
-    "vanishes_at_centre": "at the centre of the covariates every shape is the template",
-}
-"""What each capability means to whoever uses an atlas."""
 
 TRAINED: dict[str, Callable[[float], str]] = {
     "iterations": "{:,} iterations".format,
@@ -54,9 +39,8 @@ def info(atlas: AtlasFile) -> None:
     if not model.capabilities.evolvable:
         print("  its shapes depend on no covariates")
     print(f"model: {model.title}")
-    for name, can in dataclasses.asdict(model.capabilities).items():
-        if can:
-            print(f"  {CAN[name]}")
+    for can in model.capabilities.told:
+        print(f"  {can}")
     print(f"networks: {weights:,} weights, latent code of {checkpoint.preset.network.latent}")
     width = checkpoint.frame.length(2 * checkpoint.frame.scale_mm, 0)
     where = "in the plane, " if checkpoint.frame.dim == 2 else ""

@@ -6,14 +6,6 @@ from naisr_model.covariates import Covariate, Population
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.words.titles import label
 
-CAN = {
-    "disentangleable": "the effect of each covariate alone can be seen",
-    "evolvable": "shapes can be followed along covariates",
-    "transferable": "a patient can be seen on another day",
-    "has_template": "there is a template that all shapes are deformed from",
-}
-"""What a shape model can do, by capability."""
-
 WEAK = (
     "Where hardly anyone was seen, beyond the line under Data support, a shape is a guess and is marked so. "
     "How well an atlas reconstructs people it was not trained on, naisr evaluate tells."
@@ -27,7 +19,7 @@ def about_atlas(card: AtlasCard) -> tuple[str, ...]:
     return (
         f"Trained on {_counted(people, held_out=False)}; {_counted(people, held_out=True)} held out.",
         *(f"{label(each.name)}: {_observed(each)}" for each in card.covariates),
-        *(f"Can: {told}." for name, told in CAN.items() if getattr(card.capabilities, name)),
+        *(f"Can: {told}." for told in card.capabilities.told),
         WEAK,
         f"File: {card.path}",
     )

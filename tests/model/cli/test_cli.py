@@ -10,8 +10,7 @@ import trimesh
 from eggs import egg
 
 from naisr_model import cli
-from naisr_model.capabilities import Capabilities
-from naisr_model.cli.atlases import CAN
+from naisr_model.capabilities import CAN, Capabilities
 from naisr_model.evaluation.studies import STUDIES
 from naisr_model.models.factory import presets
 
