@@ -7,12 +7,15 @@ import pytest
 import torch
 
 from naisr_model.atlas import Atlas
+from naisr_model.checkpoint import load
+from naisr_model.config import read_toml
 from naisr_model.covariates import normalised_vector
 from naisr_model.data.align import rigid_transform
 from naisr_model.data.populations import airway
 from naisr_model.evaluation.held_out import held_out, held_out_rows
 from naisr_model.evaluation.metrics import HAUSDORFF, Pair, compare, component_count
 from naisr_model.evaluation.truth import plausible_values
+from naisr_model.models.factory import preset
 from naisr_model.shipped import shipped_atlas
 from naisr_model.surface.fields import shape_field
 from naisr_model.surface.isosurface import isosurface
@@ -25,6 +28,12 @@ RESOURCES = Path(__file__).parents[2] / "resources"
 @pytest.fixture(scope="module")
 def atlas() -> Atlas:
     return Atlas.load(RESOURCES / "airway.safetensors")
+
+
+@pytest.mark.parametrize("name", ["airway", "bodies"])
+def test_the_settings_beside_an_atlas_are_those_it_was_trained_with(name):
+    settings = read_toml(RESOURCES / f"{name}.toml", preset("demo"))
+    assert load(RESOURCES / f"{name}.safetensors").preset == settings
 
 
 def test_the_program_finds_its_atlas():
