@@ -183,7 +183,8 @@ def _errors(places: Sequence[Mapping[str, Any]], enclosed: str) -> str:
         return "–"
     errors = [abs(place[f"{enclosed}_error"]) for place in places]
     hausdorff = np.mean([place["hd_x100"] for place in places])
-    return f"{100 * np.mean(errors):.1f} / {100 * max(errors):.1f} %, {hausdorff:.2f}"
+    told = f"{hausdorff:.2f}" if np.isfinite(hausdorff) else "no surface at some"
+    return f"{100 * np.mean(errors):.1f} / {100 * max(errors):.1f} %, {told}"
 
 
 def _sizes(atlases: Sequence[Mapping[str, Any]]) -> str:
