@@ -86,7 +86,7 @@ def trained(egg_store: SampleStore, made_once) -> Callable[[Preset], Path]:
 @pytest.fixture(scope="session")
 def egg_atlas(trained) -> Path:
     """Of NAISR."""
-    return Path(trained(egg_preset(epochs=100)))
+    return Path(trained(egg_preset(epochs=300)))
 
 
 @pytest.fixture(scope="session")
@@ -98,13 +98,13 @@ def egg_deepsdf(trained) -> Path:
 @pytest.fixture(scope="session")
 def egg_asdf(trained) -> Path:
     """Of a model that depends on covariates and has no template."""
-    return Path(trained(egg_asdf_preset(epochs=200)))
+    return Path(trained(egg_asdf_preset(epochs=300)))
 
 
 @pytest.fixture(scope="session")
 def egg_joint(trained) -> Path:
     """Of a model that has a template and one displacement of all covariates."""
-    return Path(trained(egg_joint_preset(epochs=100)))
+    return Path(trained(egg_joint_preset(epochs=300)))
 
 
 @pytest.fixture(scope="session")

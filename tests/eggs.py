@@ -34,7 +34,7 @@ def egg(age: float, sex: float) -> trimesh.Trimesh:
     return mesh
 
 
-def egg_preset(epochs: int) -> Preset:
+def egg_preset(epochs: int, hidden_rate: float = 0.0) -> Preset:
     """The demo recipe on networks small enough for a test."""
     network = NaisrConfig(
         latent=4, template=SirenConfig(32, 1, omega0=5.0), displacement=SirenConfig(16, 1, omega0=2.0)
@@ -48,6 +48,7 @@ def egg_preset(epochs: int) -> Preset:
         uniform_points=32,
         template_rate=2e-3,
         displacement_rate=2e-3,
+        hidden_rate=hidden_rate,
     )
     return Preset("naisr", network, training)
 
@@ -68,6 +69,7 @@ def egg_single_preset(model: str, epochs: int) -> Preset:
         batch_shapes=10,
         template_rate=2e-3,
         latent_rate=1e-2,
+        hidden_rate=0.0,
     )
     return Preset(model, network, training)
 

@@ -195,7 +195,7 @@ def test_the_help_of_populate_names_every_population():
         "from naisr_model import cli; cli.main(['populate', '--help'])"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert "airway or bodies or pears." in " ".join(done.stdout.replace("\u2502", " ").split())
+    assert "airway or bodies or starman or pears." in " ".join(done.stdout.replace("\u2502", " ").split())
 
 
 def test_a_switch_is_there_to_be_turned_on(naisr):

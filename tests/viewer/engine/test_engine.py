@@ -112,7 +112,7 @@ def test_a_missing_file_is_named(engine, tmp_path):
 
 def test_an_atlas_of_curves_is_refused_in_words(atlas, atlas_file):
     atlas.frame = Frame((0.0, 0.0), 1.0)
-    with pytest.raises(InputError, match="2D"):
+    with pytest.raises(InputError, match="an atlas of curves in the plane"):
         Engine(lambda _: atlas).open(atlas_file)
 
 

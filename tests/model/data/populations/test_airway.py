@@ -349,6 +349,6 @@ def test_bad_input_is_explained() -> None:
 def test_populations_are_found_by_name() -> None:
     module: PopulationModule = airway  # what the type checker must agree with
     assert population("airway") is module
-    assert set(POPULATIONS) == {"airway", "bodies"}
-    with pytest.raises(InputError, match="unknown population 'heart'; known are airway, bodies"):
+    assert set(POPULATIONS) == {"airway", "bodies", "starman"}
+    with pytest.raises(InputError, match="unknown population 'heart'; known are airway, bodies, starman"):
         population("heart")
