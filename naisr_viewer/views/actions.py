@@ -280,7 +280,7 @@ COMMANDS = (
         "copy picture",
         "Copy picture",
         lambda window: window.picture_copy_requested.emit(),
-        keys=("Ctrl+Shift+C",),
+        keys=("Ctrl+Alt+P",),
         tip="Copy the shapes as a picture",
         needs=OPEN,
     ),
