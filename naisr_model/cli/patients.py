@@ -299,12 +299,13 @@ def _tell_measures(record: Mapping[str, Any], covariates: Iterable[Covariate], f
     """A table, and with whom the shape is compared."""
     from naisr_model.measures.kinds import MEASURES
 
-    whose, among = ("average", "") if fitted is None else ("patient", "percentile")
-    print(f"{'':24}{whose:>14}  {'95 % of people have':26}{among}".rstrip())
+    whose, beside = ("average", "95 % sure") if fitted is None else ("patient", "percentile")
+    print(f"{'':24}{whose:>14}  {'95 % of people have':26}{beside}".rstrip())
     for name, row in record["measures"].items():
         value, low, high = (_three_digits(row[key]) for key in ("value", "low", "high"))
-        usual, place = f"{low} to {high} {row['unit']}", f"{row['percentile']:.0f}" if among else ""
-        print(f"{MEASURES[name].title:24}{f'{value} ' + row['unit']:>14}  {usual:26}{place}".rstrip())
+        usual = f"{low} to {high} {row['unit']}"
+        found = _sure_in_words(row) if fitted is None else f"{row['percentile']:.0f}"
+        print(f"{MEASURES[name].title:24}{f'{value} ' + row['unit']:>14}  {usual:26}{found}".rstrip())
     if "sections" in record:
         print(f"narrowest {record['sections']['narrowest_at_mm']:.0f} mm from the upper end")
     if "outside" in record:
@@ -316,6 +317,12 @@ def _tell_measures(record: Mapping[str, Any], covariates: Iterable[Covariate], f
     if fitted is not None and fitted.inferred:
         names = ", ".join(fitted.inferred)
         print(f"inferred from the scan itself: {names}; the people are those that it looks like")
+
+
+def _sure_in_words(row: Mapping[str, Any]) -> str:
+    """Where the average is with a probability of 95 %; nothing where people are too few to say."""
+    ends = [_three_digits(row[key]) for key in ("sure_low", "sure_high") if key in row]
+    return " to ".join(ends)
 
 
 def _three_digits(value: float) -> str:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from naisr_model.atlas import Atlas, Individual
     from naisr_model.measures.curves import Gauge
     from naisr_model.measures.kinds import Measure, Surface
-    from naisr_model.measures.norms import Norm, Spread
+    from naisr_model.measures.norms import Norm, Norms, Spread
 
 PLACES = 25
 """Along a continuous covariate, at which shapes are measured."""
@@ -79,8 +79,20 @@ class Seen:
     margins: Mapping[str, float]
 
 
-Among = Mapping[str, tuple["Spread", Numbers]]
-"""How a measure differs among people, and what the training visits have, by its name."""
+@dataclass(frozen=True, eq=False)
+class Among:
+    """A measure among the people behind an atlas.
+
+    Attributes:
+        spread: how it differs among them.
+        observed: of the training visits, ``[S]``.
+        sure: both ends of where the population's is, by itself, with a probability of 95 %, as shares of it
+            along the way, ``[2, n]``; None where that is not known.
+    """
+
+    spread: Spread
+    observed: Numbers
+    sure: Numbers | None
 
 
 def curves(source: Source, request: CurveRequest, progress: Progress = SILENT) -> Curves:
@@ -97,7 +109,7 @@ def curves(source: Source, request: CurveRequest, progress: Progress = SILENT) -
     way, norms = way_of(atlas, request), source.known_norms(request.atlas)
     carried = _carried(atlas, gauge.coarse, way, person, progress.part(0.0, 0.8))
     seen = None if person is None else _seen(atlas, gauge, person)
-    among = {} if norms is None else {name: (norms.spreads[name], norms.own[name]) for name in norms.own}
+    among = {} if norms is None else {name: _among(norms, name, way) for name in norms.own}
     told = [_curve(request.covariate, gauge, one, carried, among, seen) for one in gauge.measures.values()]
     if len(request.pins) == 2:
         told.append(_distance(atlas, request, way, person, norms is not None, progress.part(0.8, 1.0)))
@@ -178,11 +190,22 @@ def _seen(atlas: Atlas, gauge: Gauge, person: Individual) -> Seen:
     return Seen(person.covariates, own, sure)
 
 
+def _among(norms: Norms, measure: str, way: Way) -> Among:
+    sure = None
+    with suppress(InputError):  # too few people to say
+        sure = norms.intervals(measure, way.alone, np.ones(len(way.alone)))
+    return Among(norms.spreads[measure], norms.own[measure], sure)
+
+
 def _curve(
-    along: str, gauge: Gauge, measure: Measure, carried: Carried, among: Among, seen: Seen | None
+    along: str,
+    gauge: Gauge,
+    measure: Measure,
+    carried: Carried,
+    people: Mapping[str, Among],
+    seen: Seen | None,
 ) -> MeasureCurve:
-    usual = gauge.curve(measure, carried.usual)
-    spread, observed = among.get(measure.name, (None, None))
+    usual, among = gauge.curve(measure, carried.usual), people.get(measure.name)
     return MeasureCurve(
         measure.name,
         measure.title,
@@ -190,8 +213,9 @@ def _curve(
         measure.definition,
         usual,
         gauge.curve(measure, carried.grown) if carried.grown else None,
-        None if spread is None else spread.band(usual),
-        observed,
+        None if among is None else among.spread.band(usual),
+        None if among is None or among.sure is None else (usual * among.sure[0], usual * among.sure[1]),
+        None if among is None else among.observed,
         seen.gauge.curve(measure, carried.own) if seen is not None and carried.own else None,
         None if seen is None else _sighting(along, measure, seen),
     )
@@ -218,11 +242,11 @@ def _distance(
     ends = Surface(points_mm, np.zeros((0, 3), dtype=np.int64), False, None)
     measure = distance(*(Anchor((i, i, i), (1.0, 0.0, 0.0)) for i in range(2)))
     carried = _carried(atlas, ends, way, person, progress.part(0.0, 0.5))
-    among: dict[str, tuple[Spread, Numbers]] = {}
+    among: dict[str, Among] = {}
     if has_norms:
         people = people_of(atlas, ends, progress=progress.part(0.5, 1.0))
         with suppress(InputError):  # the same for everybody
-            among[DISTANCE] = spread_of(people, measure), people.own(measure)
+            among[DISTANCE] = Among(spread_of(people, measure), people.own(measure), None)
     seen = None
     if person is not None:
         own = shapes_along(atlas, ends, [person.covariates], person)[0]

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from naisr_model.covariates import Values
 from naisr_model.errors import InputError
 from naisr_viewer.engine.answers.base import Source
 from naisr_viewer.state.pins import Entry, Ledger, LedgerRequest, Part, Pin, Point, Shown
@@ -16,6 +19,7 @@ from naisr_viewer.state.requests import SurfaceRequest
 
 if TYPE_CHECKING:
     from naisr_model.atlas import Atlas, Contributions
+    from naisr_model.measures.norms import Norms
 
 
 Code = NDArray[np.float64] | None
@@ -44,11 +48,16 @@ def ledger(source: Source, request: LedgerRequest) -> Ledger:
     atlas, shapes = source.atlas(request.atlas), (request.whole, *request.others)
     latents = [_latent(source, request.atlas, shown) for shown in shapes]
     found = _found(atlas, request.pins, shapes, latents)
+    entries = tuple(entry for entry, _ in found)
+    norms = source.known_norms(request.atlas) if request.has_norms else None
+    if norms is not None:
+        with suppress(InputError):  # too few people to say
+            entries = _with_margins(entries, norms, dict(request.whole.values))
     where = [
         (shown.panel, tuple((entry.pin.number, as_point(places_mm[i])) for entry, places_mm in found))
         for i, shown in enumerate(shapes)
     ]
-    return Ledger(request, tuple(entry for entry, _ in found), tuple(where))
+    return Ledger(request, entries, tuple(where))
 
 
 def _found(
@@ -72,6 +81,26 @@ def _found(
         (_entry(pin, whole, i, atlas.population.names, has_person), places_mm[:, i])
         for i, pin in enumerate(pins)
     ]
+
+
+def _with_margins(entries: tuple[Entry, ...], norms: Norms, values: Values) -> tuple[Entry, ...]:
+    """How sure each part is, but for what sets a person apart.
+
+    Raises:
+        InputError: when people are too few to say.
+    """
+    origins_mm = np.array([entry.pin.origin_mm for entry in entries]).reshape(-1, 3)
+    ways = [{name: value} for name, value in values.items()]
+    singly = dict(zip(values, (norms.effect_margins_mm(origins_mm, one) for one in ways), strict=True))
+    together = norms.effect_margins_mm(origins_mm, values)
+    return tuple(
+        replace(
+            entry,
+            parts=tuple(replace(part, margin_mm=float(singly[part.cause][i])) for part in entry.parts),
+            total=replace(entry.total, margin_mm=None if entry.person else float(together[i])),
+        )
+        for i, entry in enumerate(entries)
+    )
 
 
 def _latent(source: Source, path: Path, shown: Shown) -> Code:

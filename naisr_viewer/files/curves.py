@@ -22,6 +22,7 @@ TABLE, PICTURE = ".csv", ".svg"
 
 SERIES = {
     "population": "the population's shape, the other covariates as they are",
+    "population, how sure": "the same, with where it is with a probability of 95 %",
     "growth path": "the same, the other continuous covariates growing along as in the population",
     "patient": "the patient at other covariates: another day is meant",
     "patient as seen": "the patient at the covariates of the fit, with its 95 % interval",
@@ -102,6 +103,9 @@ def _rows(curves: Curves, curve: MeasureCurve) -> Iterable[Row]:
     ends = [(None, None)] * len(curves.places) if curve.band is None else zip(*curve.band, strict=True)
     for place, value, (low, high) in zip(curves.places, curve.usual, ends, strict=True):
         yield "population", place, value, low, high
+    if curve.sure is not None:
+        for place, value, low, high in zip(curves.places, curve.usual, *curve.sure, strict=True):
+            yield "population, how sure", place, value, low, high
     for series, values in (("growth path", curve.path), ("patient", curve.own)):
         yield from _plain(series, curves.places, values)
     if (seen := curve.sighting) is not None:

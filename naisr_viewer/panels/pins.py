@@ -23,6 +23,7 @@ def ledger_request(state: ExplorerState) -> LedgerRequest | None:
         state.pins,
         _shown(state, FULL_SHAPE),
         tuple(_shown(state, panel) for panel in others),
+        state.has_norms,
     )
 
 

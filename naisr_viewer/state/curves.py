@@ -80,6 +80,8 @@ class MeasureCurve:
         usual: of the population's shape, ``[n]``.
         path: the same where the other continuous covariates grow along, ``[n]``; None where there are none.
         band: both ends of what 95 % of the people have, ``[n]`` each; None as long as that is not known.
+        sure: both ends of where ``usual`` is with a probability of 95 %, ``[n]`` each; None likewise, and
+            where people are too few to say.
         observed: of the training visits, ``[S]``; None likewise.
         own: of the patient, ``[n]``; None where nobody is followed.
         sighting: of the patient, when seen; None for nobody.
@@ -92,6 +94,7 @@ class MeasureCurve:
     usual: Numbers
     path: Numbers | None = None
     band: tuple[Numbers, Numbers] | None = None
+    sure: tuple[Numbers, Numbers] | None = None
     observed: Numbers | None = None
     own: Numbers | None = None
     sighting: Sighting | None = None
@@ -168,11 +171,13 @@ class Readout(NamedTuple):
 
     Attributes:
         usual: of the population's shape.
-        band: what 95 % of the people have; None where that is not known.
+        sure: where that is with a probability of 95 %; None where it is not known.
+        band: what 95 % of the people have; None likewise.
         own: of the patient; None where nobody is followed.
     """
 
     usual: float
+    sure: tuple[float, float] | None
     band: tuple[float, float] | None
     own: float | None
 
@@ -183,5 +188,5 @@ def readout(curves: Curves, curve: MeasureCurve, place: float) -> Readout:
     def at(values: Numbers) -> float:
         return float(np.interp(place, curves.places, values))
 
-    band = None if curve.band is None else (at(curve.band[0]), at(curve.band[1]))
-    return Readout(at(curve.usual), band, None if curve.own is None else at(curve.own))
+    sure, band = (None if ends is None else (at(ends[0]), at(ends[1])) for ends in (curve.sure, curve.band))
+    return Readout(at(curve.usual), sure, band, None if curve.own is None else at(curve.own))

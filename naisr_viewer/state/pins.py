@@ -52,12 +52,14 @@ class LedgerRequest:
         pins: which.
         whole: the surface whose displacements are told, the full shape.
         others: the surfaces beside it in which the pins are marked.
+        has_norms: whether the people of the atlas tell how sure its effects are.
     """
 
     atlas: Path
     pins: tuple[Pin, ...]
     whole: Shown
     others: tuple[Shown, ...]
+    has_norms: bool = False
 
 
 @dataclass(frozen=True)
@@ -68,11 +70,18 @@ class Part:
         cause: name of a covariate; empty for what sets the person apart, and for the sum.
         normal_mm: along the outward normal of the full shape; all causes' add up to the sum's.
         tangential_mm: length of the rest, along the surface.
+        margin_mm: half of the 95 % interval of ``normal_mm``; None where that is not known, as of a person.
     """
 
     cause: str
     normal_mm: float
     tangential_mm: float
+    margin_mm: float | None = None
+
+    @property
+    def is_told(self) -> bool:
+        """Whether the people of the atlas tell it from nothing, as far as is known."""
+        return self.margin_mm is None or abs(self.normal_mm) > self.margin_mm
 
 
 @dataclass(frozen=True)

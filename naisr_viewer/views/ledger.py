@@ -14,11 +14,10 @@ from naisr_viewer.views.colours import covariate_colour, pin_colour
 from naisr_viewer.views.elided import shortened
 from naisr_viewer.views.theme import LIGHT, Theme
 from naisr_viewer.words import ledger as words
-from naisr_viewer.words.numbers import way
 from naisr_viewer.words.titles import as_tip
 
 TITLE_PX, LINE_PX = 24, 20
-NAME_PX, FIGURE_PX, ALONG_PX = 96, 78, 118
+NAME_PX, FIGURE_PX, ALONG_PX = 96, 118, 118
 """Widths of the name, of the figure and, where there is room, of what is along the surface."""
 
 LEAST_BAR_PX = 48
@@ -26,6 +25,9 @@ WIDEST_PX = 620
 """Of one place; longer bars would say no more."""
 
 DOT_PX = 10
+PALE = 0.35
+"""Opacity of a bar that is not told from nothing."""
+
 LEAST_SCALE_MM = 0.5
 """Bars of less than that are not blown up to the whole width."""
 
@@ -44,7 +46,9 @@ class Ink:
 
     def of(self, part: Part) -> QColor:
         """The colour of a part; grey of what no covariate did."""
-        return QColor(dict(self.causes).get(part.cause, self.theme.muted))
+        colour = QColor(dict(self.causes).get(part.cause, self.theme.muted))
+        colour.setAlphaF(1.0 if part.is_told else PALE)
+        return colour
 
 
 class EntryChart(QWidget):
@@ -118,19 +122,25 @@ class EntryChart(QWidget):
         self._write(painter, QRectF(0, top, NAME_PX - 6, LINE_PX), name)
         self._paint_bar(painter, QRectF(NAME_PX, top, right - NAME_PX - 6, LINE_PX), part)
         end = Qt.AlignmentFlag.AlignRight
-        self._write(painter, QRectF(right, top, FIGURE_PX, LINE_PX), way(part.normal_mm), side=end)
+        self._write(painter, QRectF(right, top, FIGURE_PX, LINE_PX), words.across(part), side=end)
         if along_px:
             box = QRectF(right + FIGURE_PX, top, along_px, LINE_PX)
             self._write(painter, box, words.along(part), muted=True, side=end)
 
     def _paint_bar(self, painter: QPainter, box: QRectF, part: Part) -> None:
         middle, half = box.center().x(), box.width() / 2
-        long_px = half * max(-1.0, min(1.0, part.normal_mm / self._scale_mm))
-        painter.fillRect(
-            QRectF(middle, box.top() + 5, long_px, box.height() - 10).normalized(), self._ink.of(part)
-        )
+
+        def place(mm: float) -> float:
+            return middle + half * max(-1.0, min(1.0, mm / self._scale_mm))
+
+        bar = QRectF(middle, box.top() + 5, place(part.normal_mm) - middle, box.height() - 10)
+        painter.fillRect(bar.normalized(), self._ink.of(part))
         painter.setPen(QPen(QColor(self._ink.theme.muted), 1.0))
         painter.drawLine(QPointF(middle, box.top() + 2), QPointF(middle, box.bottom() - 2))
+        if part.margin_mm is not None:
+            painter.setPen(QPen(QColor(self._ink.theme.text), 1.5))
+            low, high = (place(part.normal_mm + side * part.margin_mm) for side in (-1, 1))
+            painter.drawLine(QPointF(low, box.center().y()), QPointF(high, box.center().y()))
 
     def _write(
         self,

@@ -10,7 +10,8 @@ from naisr_viewer.words.titles import label
 LAST_MOVED = "moved last"
 HINT = (
     "Line: the population's shape, the other covariates as they are\n"
-    "Shaded: what 95 % of people have at these covariates\n"
+    "Dark: where that line is with a probability of 95 %, as far as the people behind the atlas tell\n"
+    "Pale: what 95 % of people have at these covariates\n"
     "Dashed: the others growing along, as in the population\n"
     "Dots: the shapes behind the atlas, each at its own covariates\n"
     "In the patient's colour: the dot as seen, with its 95 % interval; the line on other days\n"
@@ -37,8 +38,10 @@ def hint(curve: MeasureCurve) -> str:
 
 def told(covariate: Covariate, curves: Curves, curve: MeasureCurve, place: float) -> str:
     """What there is at a place along a curve, a line each: the population, its people, the patient."""
-    usual, band, own = readout(curves, curve, place)
+    usual, sure, band, own = readout(curves, curve, place)
     lines = [f"{label(covariate.name)} {reading(covariate, place)}: {figure(usual, curve.unit)}"]
+    if sure is not None:
+        lines.append(f"95 % sure: {_ends(*sure)}")
     if band is not None:
         lines.append(f"95 % of people: {_ends(*band)}")
     if own is not None:

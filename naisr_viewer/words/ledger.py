@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from naisr_viewer.state.pins import Entry, Part
-from naisr_viewer.words.numbers import length, way
+from naisr_viewer.words.numbers import length, margin, way
 from naisr_viewer.words.titles import label
 
 PERSON, SUM = "This person", "Together"
 
 HINT = (
     "How far this place of the full shape has come from the template, cause by cause, along the outward "
-    "normal: + outwards, − inwards. The causes add up."
+    "normal: + outwards, − inwards. The causes add up. Behind ± stands half of the 95 % interval, where the "
+    "people behind the atlas tell it; a bar is pale where they do not tell the effect from nothing."
 )
 INVITATION = (
     "Click on a shape to pin a place, up to three. It is marked in every shape, and here stands what each "
@@ -31,6 +32,11 @@ def lines(entry: Entry) -> tuple[tuple[str, Part], ...]:
     return (*causes, *person, (SUM, entry.total))
 
 
+def across(part: Part) -> str:
+    """The way along the normal, with half of its 95 % interval where that is known."""
+    return way(part.normal_mm) if part.margin_mm is None else margin(part.normal_mm, part.margin_mm)
+
+
 def along(part: Part) -> str:
     """The rest of the way, which the shape's outline does not show."""
     return f"{length(part.tangential_mm)} along it"
@@ -38,5 +44,9 @@ def along(part: Part) -> str:
 
 def told(entry: Entry) -> str:
     """All of an entry, for who hovers over it or has it read aloud."""
-    rows = [f"{name}: {way(part.normal_mm)}, {along(part)}" for name, part in lines(entry)]
+    rows = [f"{name}: {_line(part)}" for name, part in lines(entry)]
     return "\n".join([title(entry.pin.number), *rows])
+
+
+def _line(part: Part) -> str:
+    return f"{across(part)}{'' if part.is_told else ', not told from nothing'}, {along(part)}"

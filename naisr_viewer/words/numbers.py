@@ -55,6 +55,11 @@ def way(mm: float) -> str:
     return f"{sign}{length(abs(mm))}"
 
 
+def margin(mm: float, sure_mm: float) -> str:
+    """How far something moved, and half of the 95 % interval of that: ``+2.31 ± 0.12 mm``."""
+    return f"{way(mm).removesuffix(' mm')} ± {length(sure_mm)}"
+
+
 def duration(seconds: float) -> str:
     """``0.49 s``, ``4.2 s``, ``132 s``."""
     digits = 2 if seconds < 0.995 else 1 if seconds < 9.95 else 0

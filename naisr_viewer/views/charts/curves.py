@@ -18,7 +18,7 @@ from naisr_viewer.words import curves as words
 from naisr_viewer.words.titles import label
 
 GRASP_PX = 8.0
-BAND_ALPHA, DOT_ALPHA = 46, 95
+BAND_ALPHA, SURE_ALPHA, DOT_ALPHA = 46, 95, 95
 DOT_PX, SIGHTING_PX = 4, 9
 MARGIN = 0.02
 LEVEL_PX = 90
@@ -30,7 +30,7 @@ PICTURE = QSize(720, 440)
 
 
 class CurveChart(DraggableChart):
-    """The population's curve with its band, people as dots, a patient, and the line.
+    """The population's curve with its bands, people as dots, a patient, and the line.
 
     Args:
         parent: the widget around it.
@@ -43,13 +43,13 @@ class CurveChart(DraggableChart):
         self._colours = (LIGHT.accent, LIGHT.accent)
         self._curve: MeasureCurve | None = None
         self._is_labelled = False
-        self._low, self._high, self._usual, self._path, self._own = (_line() for _ in range(5))
-        self._band = pyqtgraph.FillBetweenItem(self._low, self._high)
+        self._usual, self._path, self._own = (_line() for _ in range(3))
+        self._band, self._sure = (pyqtgraph.FillBetweenItem(_line(), _line()) for _ in range(2))
         self._dots = pyqtgraph.ScatterPlotItem(size=DOT_PX, pen=None, antialias=True)
         self._interval = pyqtgraph.ErrorBarItem(x=np.zeros(0), y=np.zeros(0))
         self._sighting = pyqtgraph.ScatterPlotItem(size=SIGHTING_PX, antialias=True)
         self._here = pyqtgraph.InfiniteLine(movable=False)
-        people = (self._band, self._dots, self._path, self._usual)
+        people = (self._band, self._sure, self._dots, self._path, self._usual)
         for depth, item in enumerate((*people, self._own, self._interval, self._sighting, self._here)):
             item.setZValue(10 * depth)
             self.plotItem.vb.addItem(item, ignoreBounds=True)
@@ -67,11 +67,13 @@ class CurveChart(DraggableChart):
         """
         self._covariates, self._curve, self._colours = (covariate,), curve, colours
         lines = {self._usual: curve.usual, self._path: curve.path, self._own: curve.own}
-        ends = curve.band or (None, None)
-        for item, values in (lines | {self._low: ends[0], self._high: ends[1]}).items():
+        bands = {self._band: curve.band, self._sure: curve.sure}
+        for item, ends in bands.items():
+            lines |= dict(zip(item.curves, ends or (None, None), strict=True))
+        for item, values in lines.items():
             item.setData(*_drawn(curves.places, values))
         self._dots.setData(*_drawn(_strewn(curves.visits, covariate), curve.observed))
-        drawn = {self._path: curve.path, self._own: curve.own, self._band: curve.band}
+        drawn = bands | {self._path: curve.path, self._own: curve.own}
         for item, known in (drawn | {self._dots: curve.observed}).items():
             item.setVisible(known is not None)
         self._show_sighting(curve)
@@ -124,10 +126,11 @@ class CurveChart(DraggableChart):
 
     def _colour(self) -> None:
         covariate, patient = map(QColor, self._colours)
-        band, dot = QColor(covariate), QColor(self._theme.muted)
-        band.setAlpha(BAND_ALPHA)
-        dot.setAlpha(DOT_ALPHA)
+        band, sure, dot = QColor(covariate), QColor(covariate), QColor(self._theme.muted)
+        for colour, alpha in ((band, BAND_ALPHA), (sure, SURE_ALPHA), (dot, DOT_ALPHA)):
+            colour.setAlpha(alpha)
         self._band.setBrush(band)
+        self._sure.setBrush(sure)
         self._dots.setBrush(dot)
         self._usual.setPen(pyqtgraph.mkPen(covariate, width=2))
         self._path.setPen(pyqtgraph.mkPen(covariate, width=1.5, style=Qt.PenStyle.DashLine))
@@ -178,7 +181,7 @@ def _strewn(visits: Numbers, covariate: Covariate) -> Numbers:
 
 def _span(curve: MeasureCurve) -> tuple[float, float]:
     """All that is to be seen of a measure."""
-    parts = [curve.usual, curve.path, curve.observed, curve.own, *(curve.band or ())]
+    parts = [curve.usual, curve.path, curve.observed, curve.own, *(curve.band or ()), *(curve.sure or ())]
     if (seen := curve.sighting) is not None:
         parts.append(seen.value + np.array([-1.0, 1.0]) * (seen.margin or 0.0))
     numbers = np.concatenate([part for part in parts if part is not None])

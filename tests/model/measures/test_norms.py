@@ -112,7 +112,7 @@ def test_training_people_are_reconstructed(norms):
 def test_norms_are_kept_without_shapes(norms, tmp_path):
     file = tmp_path / "norms.safetensors"
     save_norms(norms, file)
-    assert file.stat().st_size < 20_000
+    assert file.stat().st_size < 60_000
     again, values = load_norms(file, norms.atlas), {"age": 6.0, "sex": 1.0}
     assert measure_record(again, values) == measure_record(norms, values)
     points = 1.05 * np.asarray(norms.gauge.coarse.points_mm)
@@ -120,7 +120,7 @@ def test_norms_are_kept_without_shapes(norms, tmp_path):
     assert np.array_equal(kept, fresh)
 
 
-@pytest.mark.parametrize("name", ["own.volume", "ratios.area", "local"])
+@pytest.mark.parametrize("name", ["own.volume", "ratios.area", "offsets"])
 def test_damaged_norms_are_refused(norms, tmp_path, name):
     file = tmp_path / "norms.safetensors"
     save_norms(norms, file)
@@ -138,6 +138,7 @@ def test_a_shape_is_told_among_its_people(norms):
     record = measure_record(norms, {"age": 6.0, "sex": 1.0})
     assert record["measures"].keys() == {"volume", "area"} and "outside" not in record
     volume = record["measures"]["volume"]
+    assert volume["sure_low"] < volume["value"] < volume["sure_high"]
     assert volume["low"] < volume["value"] < volume["high"] and 10 < volume["percentile"] < 90
     assert record["covariates"] == {"age": 6.0, "sex": 1.0}
 
@@ -150,3 +151,19 @@ def test_places_of_the_surface_are_judged_by_their_own_spread(norms):
     outward = points + sd[:, None] * points / np.linalg.norm(points, axis=1, keepdims=True)
     here, there = (norms.local.scores(atlas, place, values) for place in (points, outward))
     assert np.median(there - here) == pytest.approx(1, rel=0.15)
+
+
+def test_the_population_is_surest_where_its_people_are(norms):
+    ways = [{"age": age} for age in (1.0, 5.0, 9.0)]
+    usual = np.array([norms.usual(values)["volume"] for values in ways])
+    low, high = norms.intervals("volume", ways, usual)
+    assert ((low < usual) & (usual < high)).all() and (np.log(high / low) < 0.05).all()
+    assert np.log(high / low)[1] < np.log(high / low)[[0, 2]].min()
+
+
+def test_an_effect_is_surer_the_nearer_to_the_centre(norms):
+    origins = np.asarray(norms.gauge.fine.points_mm)[::50]
+    centre = norms.atlas.population.centre["age"]
+    margins = [norms.effect_margins_mm(origins, {"age": centre + years}) for years in (0.0, 1.0, 4.0)]
+    assert margins[0] == pytest.approx(0, abs=1e-9)
+    assert (margins[1] > 0).all() and np.mean(margins[1]) < np.mean(margins[2]) < 2

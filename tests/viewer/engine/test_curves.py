@@ -101,6 +101,14 @@ def test_moving_along_the_curve_asks_nothing_new(known):
     assert curve_request(replace(state, drawer=Tab.POINT)) is None
 
 
+def test_how_sure_the_curve_is_lies_within_what_people_have(known, egg_atlas):
+    engine, _ = known
+    found = curves(engine, CurveRequest(egg_atlas, "age", MALE, 0)).find("volume")
+    assert found.sure is not None
+    low, high = found.sure
+    assert ((low < found.usual) & (found.usual < high)).all() and (np.log(high / low) < 0.1).all()
+
+
 def test_the_distance_of_two_places_is_that_of_the_poles(known, egg_atlas):
     engine, _ = known
     template = engine.gauge(egg_atlas).fine.points_mm

@@ -13,10 +13,12 @@ from naisr_model.errors import InputError
 from naisr_viewer.engine.ledgers import ledger, origin_mm
 from naisr_viewer.panels.kinds import request_for, visible_panels
 from naisr_viewer.panels.pins import can_pin, ledger_request
-from naisr_viewer.state.explorer import ExplorerState, pinned, showing, with_value
+from naisr_viewer.state.explorer import ExplorerState, knowing_norms, pinned, showing, with_value
 from naisr_viewer.state.layouts import FULL_SHAPE, TEMPLATE, Layout, Panel
-from naisr_viewer.state.pins import LedgerRequest, Pin, Shown
+from naisr_viewer.state.pins import Entry, LedgerRequest, Part, Pin, Shown
+from naisr_viewer.words import ledger as words
 
+PIN = Pin(1, (0.0, 0.0, 0.0))
 AGE_ONLY = Panel("effect", "age")
 
 
@@ -74,6 +76,31 @@ def test_the_bars_add_up_to_the_way_along_the_normal(clicked, told):
     assert entry.total.tangential_mm == pytest.approx(np.linalg.norm(rest), abs=2e-2)
     assert [part.cause for part in entry.parts] == ["age", "sex"]
     assert entry.parts[0].normal_mm != 0
+
+
+def test_how_sure_a_bar_is_stands_beside_it_once_its_people_are_known(clicked, told, monkeypatch):
+    monkeypatch.setattr("naisr_model.measures.curves.COARSE", 32)
+    engine, _, state = clicked
+    assert all(part.margin_mm is None for part in (*told.entries[0].parts, told.entries[0].total))
+    norms = engine.norms(state.atlas.path)
+    (entry,) = ledger(engine, asked(knowing_norms(state))).entries
+    age, sex = entry.parts
+    assert replace(age, margin_mm=None) == told.entries[0].parts[0]
+    origin, values = [state.pins[0].origin_mm], dict(state.named)
+    assert age.margin_mm == norms.effect_margins_mm(origin, {"age": values["age"]})[0] > 0
+    assert sex.margin_mm == norms.effect_margins_mm(origin, {"sex": values["sex"]})[0] > 0
+    assert entry.total.margin_mm is None  # of a person: the code is not the population's
+    request = asked(knowing_norms(state))
+    average = replace(request, whole=replace(request.whole, person=0), others=())
+    assert (ledger(engine, average).entries[0].total.margin_mm or 0) > 0
+
+
+def test_what_is_less_than_its_interval_is_not_told_from_nothing():
+    entry = Entry(PIN, (Part("age", 2.314, 0.0, 0.12),), None, Part("", -0.1, 0.04, 0.3))
+    assert words.told(entry) == (
+        "Place 1\nAge: +2.31 ± 0.12 mm, 0.00 mm along it\n"
+        "Together: −0.10 ± 0.30 mm, not told from nothing, 0.04 mm along it"
+    )
 
 
 def slope(atlas, point_mm, values, latent) -> np.ndarray:

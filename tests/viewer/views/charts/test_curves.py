@@ -27,6 +27,7 @@ VOLUME = MeasureCurve(
     usual=PLACES / 2,
     path=PLACES,
     band=(PLACES / 3, 2 * PLACES / 3),
+    sure=(PLACES / 2.2, PLACES / 1.8),
     observed=np.array([20.0, 60.0]),
     own=PLACES / 2.5,
     sighting=Sighting(84.0, 33.0, 2.0),
@@ -111,7 +112,8 @@ def test_a_picture_has_its_axes_told_and_no_pixels(chart, qtbot):
 def test_what_is_not_known_is_not_told(atlas):
     age = atlas.covariates[0]
     assert told(age, CURVES, VOLUME, 84.0) == (
-        "Age 84 months: 42.0 cm³\n95 % of people: 28.0 to 56.0\nThis patient: 33.6 cm³"
+        "Age 84 months: 42.0 cm³\n95 % sure: 38.2 to 46.7\n"
+        "95 % of people: 28.0 to 56.0\nThis patient: 33.6 cm³"
     )
-    bare = dataclasses.replace(VOLUME, band=None, own=None)
+    bare = dataclasses.replace(VOLUME, band=None, sure=None, own=None)
     assert told(age, CURVES, bare, 84.0) == "Age 84 months: 42.0 cm³"
