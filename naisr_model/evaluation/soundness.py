@@ -24,15 +24,22 @@ def surface_places(atlas: Atlas) -> dict[str, list[dict[str, float]]]:
 
     Returns:
         ``plausible``, every training covariate vector and each slider from end to end with the others at
-        their mean; and ``corners``, those of the box of ranges. Where shapes do not depend on covariates
-        there is one surface and no corner.
+        their mean, binary ones at each level where shapes between them are not known; and ``corners``, those
+        of the box of ranges. Where shapes do not depend on covariates there is one surface and no corner.
     """
     if not atlas.capabilities.evolvable:
         return {"plausible": [{}], "corners": []}
     population = atlas.population
     training = [population.row(int(row)) for row in np.flatnonzero(~population.held_out)]
+    can = atlas.capabilities
+    binary = [] if can.vanishes_at_centre else [one for one in atlas.covariates if one.kind == "binary"]
+    levels = [
+        dict(zip((one.name for one in binary), map(float, chosen), strict=True))
+        for chosen in itertools.product(*(one.range for one in binary))
+    ]
     sliders = [
-        {covariate.name: float(value)}
+        {**others, covariate.name: float(value)}
+        for others in levels
         for covariate in atlas.covariates
         for value in np.linspace(*covariate.range, 2 * EFFECT_VALUES)
     ]

@@ -39,7 +39,7 @@ def can_judge(atlas: AtlasCard) -> bool:
 
 
 def wants_norms(state: ExplorerState) -> bool:
-    """Whether anything on screen is compared with what is usual."""
+    """Whether anything on screen is compared with what is usual, or told with how sure it is by that."""
     if state.atlas is None or not can_judge(state.atlas):
         return False
-    return state.can_forecast or state.drawer is Tab.CURVE
+    return state.can_forecast or state.drawer is Tab.CURVE or (state.drawer is Tab.POINT and bool(state.pins))

@@ -9,6 +9,7 @@ from typing import Any
 from naisr_model.evaluation.studies.calibration import Calibration
 from naisr_model.evaluation.studies.comparison import Comparison
 from naisr_model.evaluation.studies.completion import Completion
+from naisr_model.evaluation.studies.confidence import ConfidenceStudy
 from naisr_model.evaluation.studies.fitting import Fitting
 from naisr_model.evaluation.studies.norms import NormsStudy
 from naisr_model.evaluation.studies.reconstruction import Reconstruction
@@ -24,5 +25,6 @@ STUDIES: Mapping[str, type[Study[Any]]] = MappingProxyType(
         "fitting": Fitting,
         "calibration": Calibration,
         "norms": NormsStudy,
+        "confidence": ConfidenceStudy,
     }
 )

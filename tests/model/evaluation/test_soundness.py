@@ -23,6 +23,13 @@ def test_surfaces_are_looked_at_where_data_are_and_at_the_corners(atlas):
     assert corners == {(a, s) for a in age.range for s in sex.range}
 
 
+def test_between_two_levels_nothing_is_asked_of_a_model_that_knows_nothing_there(egg_asdf):
+    atlas = Atlas.load(egg_asdf)
+    plausible = surface_places(atlas)["plausible"]
+    assert {values["sex"] for values in plausible if "age" in values} == {-1.0, 1.0}
+    assert all("sex" in values for values in plausible)
+
+
 def test_an_egg_is_one_piece_without_folds(atlas):
     assert components(atlas, {"age": 5.0}, 64) == 1
     assert 0 <= folded_share(atlas) < 0.05
