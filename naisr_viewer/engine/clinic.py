@@ -18,6 +18,7 @@ from naisr_viewer.state.patients import Fitted, Labels, Named, Reading, Scan
 from naisr_viewer.state.requests import EXACT_RESOLUTION, SurfaceRequest, SurfaceResult
 
 if TYPE_CHECKING:
+    from naisr_model.data.patients import PatientShape
     from naisr_model.patients.intake import Intake
 
 SHOWN_FACES = 20_000
@@ -126,8 +127,8 @@ def _told(person: FittedPerson, number: int, surface: SurfaceResult) -> Fitted:
         person=number,
         values=surface.request.values,
         intervals=tuple((name, *ends) for name, ends in fit.intervals.items()),
-        volume_cm3=surface.volume_cm3,
-        volume_margin_cm3=surface.volume_margin_cm3,
+        extent=surface.extent,
+        extent_margin=surface.extent_margin,
         residual_mm=fit.residual_mm,
         lasting=fit.lasting if person.atlas_model.capabilities.transferable else None,
         seconds=fit.seconds,
@@ -145,11 +146,10 @@ def _is_clear(titles: Mapping[int | str, str]) -> bool:
 
 def _scan(taken: Intake) -> Scan:
     """A scan as the window shows it."""
-    from naisr_model.data.patients import decimated
     from naisr_model.data.remarks import SEVERITIES
 
     whole = taken.patient
-    thin = decimated(whole, SHOWN_FACES) if len(whole.mesh_mm.faces) > SHOWN_FACES else whole
+    thin, dim = _thin(whole), whole.mesh_mm.vertices.shape[1]
     said = {
         severity: [one.text for one in taken.remarks if one.severity == severity] for severity in SEVERITIES
     }
@@ -158,15 +158,23 @@ def _scan(taken: Intake) -> Scan:
     return Scan(
         points_mm=np.array(points_mm, np.float32),  # a plain array: trimesh's own remember their mesh
         normals=np.array(normals, np.float32),
-        faces=np.asarray(thin.mesh_mm.faces, np.int64).reshape(-1, 3),
+        faces=np.asarray(thin.mesh_mm.faces, np.int64).reshape(-1, dim),
         source=whole.source,
-        volume_cm3=whole.volume_cm3,
+        extent=taken.own_extent,
         alignment=taken.alignment,
         notes=tuple(said["look"]),
         repairs=tuple(said["fine"]),
         blocked=" ".join(said["refuse"]),
-        is_astray=any(one.topic in ("astray", "far") for one in taken.found),
+        is_astray=dim == 3 and any(one.topic in ("astray", "far") for one in taken.found),
     )
+
+
+def _thin(whole: PatientShape) -> PatientShape:
+    """A surface of many triangles for display; a curve as it is."""
+    from naisr_model.data.patients import decimated
+
+    is_large = len(whole.mesh_mm.faces) > SHOWN_FACES and whole.mesh_mm.vertices.shape[1] == 3
+    return decimated(whole, SHOWN_FACES) if is_large else whole
 
 
 def _thinned(points_mm: NDArray[np.float64]) -> NDArray[np.float64]:

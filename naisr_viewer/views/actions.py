@@ -159,6 +159,11 @@ def _drawer(tab: Tab, keys: str, tip: str) -> Command:
     )
 
 
+def _is_in_space(atlas: AtlasCard) -> bool:
+    """Curves in the plane have one side, no triangles and nothing to cut."""
+    return not atlas.is_flat
+
+
 def _look(direction: str, number: int) -> Command:
     return Command(
         f"from {direction}",
@@ -166,6 +171,7 @@ def _look(direction: str, number: int) -> Command:
         lambda window: window.shapes.look_from(direction),
         keys=(f"Alt+{number}",),
         needs=OPEN,
+        offered=_is_in_space,
     )
 
 
@@ -289,7 +295,7 @@ COMMANDS = (
         "Copy table",
         lambda window: window.table_copy_requested.emit(),
         keys=("Ctrl+Alt+C",),
-        tip="Copy covariates, volume and cut of every view on screen, for a spreadsheet",
+        tip="Copy covariates and volume or area of every view on screen, for a spreadsheet",
         needs=OPEN,
     ),
     Command(
@@ -337,6 +343,7 @@ COMMANDS = (
         tip="Cut all shapes by one plane; again to have them whole",
         needs=AT_REST,
         is_switch=True,
+        offered=_is_in_space,
     ),
     Command(
         "edges",
@@ -346,6 +353,7 @@ COMMANDS = (
         tip="Draw the triangles that the surfaces are made of",
         needs=OPEN,
         is_switch=True,
+        offered=_is_in_space,
     ),
     Command(
         "reset camera",

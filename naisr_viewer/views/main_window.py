@@ -158,6 +158,8 @@ class MainWindow(QMainWindow):
             self.covariates.show_atlas(state.atlas, theme)
             self.shapes.show_atlas(state.atlas, theme)
             self.setWindowTitle(f"{state.atlas.name} — {TITLE}")
+            self.scale.show_unit(state.atlas.frame.unit)
+            self._centre.maps.show_unit(state.atlas.frame.unit)
             offer(COMMANDS, self._actions, state.atlas)
             self._centre.drawer.offer(tabs_of(state.atlas))
             in_order(self._stops)
@@ -361,7 +363,7 @@ class MainWindow(QMainWindow):
 
     def ask_scan(self) -> None:
         """Let a patient's file be chosen and opened."""
-        path = ask_scan_path(self)
+        path = ask_scan_path(self, self._state.atlas)
         if path is not None and is_atlas(path):
             if ask_instead(self, path, "atlas"):
                 self.open_requested.emit(path)
@@ -500,11 +502,14 @@ class MainWindow(QMainWindow):
 
     def _show_readout(self, panel: Panel, hit: Hit) -> None:
         """What the mouse rests over."""
-        scale = scale_of(self._state, panel)
+        scale, atlas = scale_of(self._state, panel), self._state.atlas
+        assert atlas is not None
         told = ""
         if hit.value is not None and scale is not None:
             told = number(hit.value, scale.unit, scale.scale == "signed")
-        self._below.show_readout(readout(title_of(panel), hit.point_mm, told))
+        self._below.show_readout(
+            readout(title_of(panel), hit.point_mm[: atlas.frame.dim], told, atlas.frame.unit)
+        )
 
     def _prepare_charts(self) -> None:
         """Once, after the first picture."""

@@ -14,7 +14,7 @@ HINT = (
 )
 INVITATION = (
     "Click on a shape to pin a place, up to three. It is marked in every shape, and here stands what each "
-    "covariate does to it, in millimetres. Esc removes the pins."
+    "covariate does to it. Esc removes the pins."
 )
 NO_PLACE = "The deformation folds at this place: it has no one place in the full shape."
 
@@ -31,12 +31,12 @@ def lines(entry: Entry) -> tuple[tuple[str, Part], ...]:
     return (*causes, *person, (SUM, entry.total))
 
 
-def along(part: Part) -> str:
+def along(part: Part, unit: str) -> str:
     """The rest of the way, which the shape's outline does not show."""
-    return f"{length(part.tangential_mm)} along it"
+    return f"{length(part.tangential_mm, unit)} along it"
 
 
-def told(entry: Entry) -> str:
+def told(entry: Entry, unit: str) -> str:
     """All of an entry, for who hovers over it or has it read aloud."""
-    rows = [f"{name}: {way(part.normal_mm)}, {along(part)}" for name, part in lines(entry)]
+    rows = [f"{name}: {way(part.normal_mm, unit)}, {along(part, unit)}" for name, part in lines(entry)]
     return "\n".join([title(entry.pin.number), *rows])

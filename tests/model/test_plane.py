@@ -23,7 +23,6 @@ from naisr_model.models.factory import preset
 from naisr_model.models.naisr.network import NaisrConfig
 from naisr_model.shapes.curve import Curve, closed
 from naisr_model.shapes.written import csv_bytes
-from naisr_viewer.app import main as viewer
 
 
 def ellipse(age: float) -> Curve:
@@ -134,8 +133,3 @@ def test_a_curve_among_meshes_is_told(egg_table, made, tmp_path) -> None:
     )
     assert [remark.row for remark in report.rejected] == [10]
     assert "it is a curve, most others are meshes" in report.rejected[0].reason
-
-
-def test_the_window_says_that_it_shows_surfaces(made, capsys, monkeypatch) -> None:
-    assert viewer([str(made / "a.safetensors"), "--screenshot", str(made / "w.png")]) == 2
-    assert "curves in the plane" in capsys.readouterr().err and not (made / "w.png").exists()
