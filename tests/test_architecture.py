@@ -72,6 +72,7 @@ LIGHT = tuple(
 )
 """What anybody may use."""
 
+DRAWS_CURVES = ("naisr_viewer.files.surfaces", "naisr_viewer.files.figure")
 CANVAS = "naisr_viewer.views.shapes.canvas"
 NO_QT = tuple(f"naisr_viewer.{room}*" for room in ("state", "words", "engine", "panels", "files"))
 SPEAKS_OF_COVARIATES = tuple(
@@ -102,11 +103,11 @@ RULES = (
         SPEAKS_OF_COVARIATES,
         ("naisr_model",),
         allowed=(*LIGHT, *VOCABULARY),
-        but_not=("naisr_viewer.files.surfaces",),
+        but_not=DRAWS_CURVES,
     ),
     # Curves have no library of their own, as surfaces have trimesh.
     Rule(
-        ("naisr_viewer.files.surfaces",),
+        DRAWS_CURVES,
         ("naisr_model",),
         allowed=(*LIGHT, *VOCABULARY, "naisr_model.shapes"),
     ),

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from naisr_model.progress import SILENT, Progress
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.engine.people import FittedPerson
+from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.layouts import FULL_SHAPE
 from naisr_viewer.state.patients import Fitted, Labels, Named, Reading, Scan
 from naisr_viewer.state.requests import EXACT_RESOLUTION, SurfaceRequest, SurfaceResult
@@ -40,7 +41,7 @@ class Clinic:
         self._engine = engine
         self._intakes: WeakKeyDictionary[Scan, Intake] = WeakKeyDictionary()
 
-    def labels(self, reading: Reading) -> Labels | None:
+    def labels(self, atlas: Path, reading: Reading) -> Labels | None:
         """What to choose from, where none is chosen and it is not clear which label is meant.
 
         Raises:
@@ -48,11 +49,12 @@ class Clinic:
         """
         from naisr_model.patients import intake
 
-        titles = intake.labels(reading.path) if reading.label is None else None
+        dim = self._engine.card_of(atlas).frame.dim
+        titles = intake.labels(reading.path, dim) if reading.label is None else None
         return Labels(reading, tuple(titles.items())) if titles and not _is_clear(titles) else None
 
     @staticmethod
-    def require_label(reading: Reading) -> None:
+    def require_label(reading: Reading, card: AtlasCard | None) -> None:
         """Make sure that it is clear which label is meant, where nobody can be asked.
 
         Raises:
@@ -60,7 +62,7 @@ class Clinic:
         """
         from naisr_model.patients import intake
 
-        intake.require_label(reading.path, reading.label)
+        intake.require_label(reading.path, reading.label, 3 if card is None else card.frame.dim)
 
     def read(self, atlas: Path, reading: Reading, known: Named, progress: Progress = SILENT) -> Scan:
         """Read a patient's file as asked and bring it into the frame of an open atlas.

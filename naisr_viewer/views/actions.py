@@ -12,6 +12,7 @@ from PySide6.QtCore import QObject, Qt, SignalInstance
 from PySide6.QtGui import QAction, QActionGroup, QKeySequence
 from PySide6.QtWidgets import QMenu, QToolBar, QWidget
 
+from naisr_model.shipped import ATLASES
 from naisr_viewer.panels.kinds import layouts_of
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.drawer import Tab, tabs_of
@@ -75,6 +76,9 @@ class Window(Protocol):
 
     def ask_screenshot(self) -> None:
         """Let a place be chosen for a picture."""
+
+    def open_example(self, name: str) -> None:
+        """Open one of the atlases that come with the program."""
 
     def show_document(self, page: str) -> None:
         """Open one of the documents that come with the program."""
@@ -188,6 +192,10 @@ def _document(title: str, page: str, *keys: str) -> Command:
     return Command(f"document {page}", title, lambda window: window.show_document(page), keys=keys)
 
 
+def _example(name: str, title: str) -> Command:
+    return Command(f"example {name}", title, lambda window: window.open_example(name), tip=f"Open {name}")
+
+
 LAYOUTS = tuple(_layout(layout, number) for number, layout in enumerate(Layout, start=1))
 DRAWER = (
     _drawer(Tab.POINT, "Ctrl+Shift+P", "What each covariate does to the places that are pinned"),
@@ -201,6 +209,7 @@ DOCUMENTS = (
     _document("Glossary", "glossary.md"),
     _document("Architecture", "architecture.md"),
 )
+EXAMPLES = tuple(_example(name, title) for name, title in ATLASES.items())
 THEMES = tuple(_theme(choice) for choice in ThemeChoice)
 
 COMMANDS = (
@@ -373,6 +382,7 @@ COMMANDS = (
         tip="All keys, and what the mouse does",
     ),
     *DOCUMENTS,
+    *EXAMPLES,
     Command(
         "about atlas",
         "About this atlas",
@@ -389,6 +399,9 @@ SEPARATOR = ""
 
 RECENT = "open recent"
 """The entry that opens a menu of files, which the window fills."""
+
+EXAMPLE = "open example"
+"""The entry that opens a menu of :data:`EXAMPLES`."""
 
 
 def _names(commands: Sequence[Command]) -> tuple[str, ...]:
@@ -408,7 +421,7 @@ MENUS = {
         *_names(LAYOUTS), "patients", *_names(DRAWER), SEPARATOR,
         "play", "section", "edges", SEPARATOR, "reset camera", *_names(LOOKS), SEPARATOR, *_names(THEMES),
     ),
-    "&Help": ("keys", *_names(DOCUMENTS), SEPARATOR, "about atlas", "about"),
+    "&Help": ("keys", *_names(DOCUMENTS), SEPARATOR, EXAMPLE, SEPARATOR, "about atlas", "about"),
 }  # fmt: skip
 """What stands in the menu bar, by name."""
 

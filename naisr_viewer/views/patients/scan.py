@@ -20,9 +20,7 @@ from naisr_viewer.words.titles import as_tip
 REREAD_TIP = "Read the file from the disk again, for example after it was edited"
 RELABEL_TIP = "Read another label of the same volume; Ctrl+Z comes back to this one"
 GHOST_TIP = "Draw what was measured, transparent, over the atlas's shape"
-METHOD_TIP = "How the scan is moved onto the atlas's shape"
 LIES_STILL = "Curves are fitted where they lie: give them in the frame of the atlas"
-UNIT_TIP = "How long one unit of the file's coordinates is"
 NO_UNIT = "The atlas's lengths have no unit: the numbers of the file are taken as they are"
 SEE_FIRST = "The scan is drawn over the atlas as it lies; see that it fits before it is fitted."
 
@@ -90,8 +88,8 @@ class AlignmentPart(QWidget):
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
         self._reading = Reading(Path())
-        self.method = ChoiceBox("Alignment", METHOD_TIP, self)
-        self.unit = ChoiceBox("Unit of the file", UNIT_TIP, self)
+        self.method = ChoiceBox("Alignment", "How the scan is moved onto the atlas's shape", self)
+        self.unit = ChoiceBox("Unit of the file", "How long one unit of the file's coordinates is", self)
         self.sentence = paragraph()
         self.hint = paragraph(SEE_FIRST, "muted")
         form = QFormLayout()
@@ -109,11 +107,8 @@ class AlignmentPart(QWidget):
 
     def show_atlas(self, atlas: AtlasCard) -> None:
         """Offer what makes sense for its shapes, and say why nothing else does."""
-        is_metric = atlas.frame.unit == MILLIMETRES
-        self.method.setEnabled(not atlas.is_flat)
-        self.method.setToolTip(LIES_STILL if atlas.is_flat else METHOD_TIP)
-        self.unit.setEnabled(is_metric)
-        self.unit.setToolTip(UNIT_TIP if is_metric else NO_UNIT)
+        self.method.refuse(LIES_STILL if atlas.is_flat else "")
+        self.unit.refuse("" if atlas.frame.unit == MILLIMETRES else NO_UNIT)
 
     def show_patient(self, patient: OpenScan, has_ghost: bool) -> None:
         """Show how ``patient``'s file was read, and that it can be seen where the scan lies."""
