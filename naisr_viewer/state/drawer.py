@@ -18,5 +18,4 @@ def tabs_of(atlas: AtlasCard) -> tuple[Tab, ...]:
     """The pages that have something to tell of an atlas."""
     if not atlas.capabilities.trackable:
         return ()
-    has_curve = bool(atlas.covariates) and not atlas.is_flat  # what is measured are surfaces
-    return tuple(tab for tab in Tab if tab is not Tab.CURVE or has_curve)
+    return tuple(tab for tab in Tab if tab is not Tab.CURVE or atlas.covariates)

@@ -53,7 +53,7 @@ def length(mm: float, unit: str = MILLIMETRES) -> str:
     In another unit, whose size nobody knows, it has three of them: ``0.0123 units``.
     """
     if unit != MILLIMETRES:
-        return f"{mm:,.{_places(mm, 3)}f} {unit}"
+        return f"{mm:,.{places(mm, 3)}f} {unit}"
     digits = 2 if abs(mm) < 9.995 else 1 if abs(mm) < 99.95 else 0
     return f"{mm:,.{digits}f} mm"
 
@@ -124,10 +124,10 @@ def _decimals(amount: float, extent: Extent) -> int:
     """Of a volume in cm³ one or none; of an area as many as make four digits."""
     if extent is SPACE:
         return 0 if abs(amount) >= 1000 else 1
-    return _places(amount, 4)
+    return places(amount, 4)
 
 
-def _places(number: float, digits: int) -> int:
+def places(number: float, digits: int) -> int:
     """How many decimals show so many digits of a number."""
     return max(0, digits - 1 - math.floor(math.log10(abs(number)))) if number else 0
 

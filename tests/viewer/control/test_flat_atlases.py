@@ -17,9 +17,12 @@ from PySide6.QtWidgets import QApplication, QFileDialog
 
 from naisr_model.data.curves import sound_curve
 from naisr_model.shapes.written import csv_bytes, svg_bytes
+from naisr_viewer.engine.curves import curves
 from naisr_viewer.engine.engine import Engine
+from naisr_viewer.panels.curves import curve_request
 from naisr_viewer.panels.kinds import visible_panels
 from naisr_viewer.program.headless import drag, finish
+from naisr_viewer.state.drawer import Tab
 from naisr_viewer.state.layouts import FULL_SHAPE, Layout, Panel
 from naisr_viewer.state.overlay import Quantity
 from naisr_viewer.state.requests import ExportChoice
@@ -29,6 +32,7 @@ from naisr_viewer.views.map_bar import MapBar
 from naisr_viewer.views.shapes.canvas import Canvas
 
 LEFT = Qt.MouseButton.LeftButton
+CTRL_SHIFT = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier
 TOLERATED = 0.05
 """Share of an area by which an atlas that was trained for some seconds may be off."""
 
@@ -96,7 +100,7 @@ def test_curves_are_filled_and_moved_but_never_turned(ready, qtbot):
     assert window.shapes.camera.zoom < moved.zoom
     QTest.keyClick(window.shapes, Qt.Key.Key_Left)
     assert window.shapes.camera.up == pytest.approx((0, 1, 0))
-    assert offered(window).isdisjoint({"Section plane", "Triangles", "From the front", "From above", "Curve"})
+    assert offered(window).isdisjoint({"Section plane", "Triangles", "From the front", "From above"})
     assert {"Reset camera", "Side by side", "Full shape"} <= offered(window)
 
 
@@ -232,6 +236,28 @@ def test_maps_say_how_far_the_curve_has_come(ready):
     top = np.argmax(shown.points_mm[:, 1])
     mean = controller.state.atlas.covariates[0].centre
     assert shown.colouring.values[top] == pytest.approx(8.0 - mean, abs=0.8)
+
+
+def test_the_drawer_shows_how_the_area_grows(ready, tmp_path):
+    window, controller = ready
+    window.covariates.rows["age"].slider.setFocus()
+    QTest.keyClick(
+        window, Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier
+    )
+    finish(window, controller)
+    request = curve_request(controller.state)
+    assert request is not None and controller.state.drawer is Tab.CURVE
+    measured = curves(controller._engine, request)
+    assert [one.name for one in measured.measures] == ["area", "length"]
+    found = measured.find("area")
+    assert found.unit == "mm²" and found.band is None
+    inner = slice(3, -3)
+    assert found.usual[inner] == pytest.approx([area(age) for age in measured.places[inner]], rel=TOLERATED)
+    page = window._centre.curve
+    assert [page.measure.itemText(i) for i in range(page.measure.count())] == [
+        "Area",
+        "Length of the outline",
+    ]
 
 
 def test_the_cache_gives_the_same_curve_at_the_next_start(ellipses, tmp_path):
