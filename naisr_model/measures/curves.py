@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 
@@ -37,7 +37,7 @@ class Gauge:
 
     fine: Surface
     coarse: Surface
-    known: Mapping[str, Measure] = MEASURES
+    known: Mapping[str, Measure] = field(default_factory=lambda: MEASURES)
 
     @cached_property
     def measures(self) -> Mapping[str, Measure]:
