@@ -429,6 +429,7 @@ class MainWindow(QMainWindow):
     def grab_image(self) -> QImage:
         """The whole window as a picture, with all that it will have in a moment."""
         self._prepare_charts()
+        self.shapes.grab()  # only what is drawn tells the scale bar how long a millimetre is
         return self.grab().toImage()
 
     def closeEvent(self, event: QCloseEvent) -> None:

@@ -51,6 +51,11 @@ class SubPlot:
     is_stale: bool = True
 
     @property
+    def is_outline(self) -> bool:
+        """Whether curves in the plane are shown, around what they enclose."""
+        return self.cap is not None and self.cap.outline is self.actor
+
+    @property
     def boxes(self) -> list[tuple[float, ...]]:
         """Bounds of what is drawn, each x, y and z from and to (mm)."""
         boxes = [self.mesh.bounds] if self.mesh.n_points else []
@@ -65,16 +70,19 @@ def set_points(plot: SubPlot, old: SurfaceResult | None, result: SurfaceResult) 
     else:
         plot.mesh.copy_from(as_polydata(result), deep=False)
         plot.actor.prop.culling = "back" if is_closed(result.faces) else "none"
-        if result.dim == 2 and plot.cap is not None:
-            plot.cap.fill(plot.mesh)
+        _fill(plot)
 
 
 def set_nothing(plot: SubPlot) -> None:
     """Empty a sub-plot."""
     plot.mesh.copy_from(pv.PolyData(), deep=False)
-    if plot.result is not None and plot.result.dim == 2 and plot.cap is not None:
-        plot.cap.fill(plot.mesh)
+    _fill(plot)
     plot.result = None
+
+
+def _fill(plot: SubPlot) -> None:
+    if plot.is_outline and plot.cap is not None:
+        plot.cap.fill(plot.mesh)
 
 
 def set_colouring(plot: SubPlot, colouring: Colouring | None) -> None:
@@ -83,7 +91,8 @@ def set_colouring(plot: SubPlot, colouring: Colouring | None) -> None:
     mapper.scalar_visibility = colouring is not None
     for name, value in (SHINY if colouring is None else MATT).items():
         setattr(plot.actor.prop, name, value)
-    plot.actor.prop.line_width = CUT_LINE_PX if colouring is None else NUMBERS_LINE_PX
+    if plot.is_outline:
+        plot.actor.prop.line_width = CUT_LINE_PX if colouring is None else NUMBERS_LINE_PX
     if colouring is not None:
         plot.mesh.point_data.set_scalars(colouring.values, "numbers")
         mapper.lookup_table = look_up_table(colouring.limit, colouring.scale)
@@ -112,7 +121,7 @@ def picked(plot: SubPlot, x: float, y: float) -> Hit | None:
         picker.AddPickList(plot.cap.filled)
     if not picker.Pick(x, y, 0.0, plot.renderer):
         return None
-    if plot.result is not None and plot.result.dim == 2:
+    if plot.is_outline:
         return _on_curve(plot, picker.GetPickPosition())
     if plot.cap is not None and picker.GetActor() is plot.cap.filled:
         return None  # what the section plane lays open is no surface

@@ -11,7 +11,6 @@ import trimesh
 
 from naisr_model.atlas import Atlas
 from naisr_model.errors import Cancelled, InputError
-from naisr_model.frames import Frame
 from naisr_model.progress import Progress
 from naisr_viewer.engine import cache
 from naisr_viewer.engine.engine import CACHED_SURFACES, Engine
@@ -108,12 +107,6 @@ def test_no_surface_is_an_answer_too(engine, card, atlas, monkeypatch):
 def test_a_missing_file_is_named(engine, tmp_path):
     with pytest.raises(InputError, match="nowhere"):
         engine.open(tmp_path / "nowhere.safetensors")
-
-
-def test_an_atlas_of_curves_is_refused_in_words(atlas, atlas_file):
-    atlas.frame = Frame((0.0, 0.0), 1.0)
-    with pytest.raises(InputError, match="an atlas of curves in the plane"):
-        Engine(lambda _: atlas).open(atlas_file)
 
 
 def tabulations(atlas) -> int:

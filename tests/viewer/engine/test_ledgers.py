@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from naisr_model.errors import InputError
+from naisr_model.frames import Frame
 from naisr_viewer.engine.ledgers import ledger, origin_mm
 from naisr_viewer.panels.kinds import request_for, visible_panels
 from naisr_viewer.panels.pins import can_pin, ledger_request
@@ -103,6 +104,7 @@ class Folding:
     """An atlas that moves all by 1 mm, and folds beyond x = 50 mm."""
 
     checkpoint = SimpleNamespace(latents=np.zeros((1, 2)))
+    frame = Frame((0.0, 0.0, 0.0), 1.0)
     population = SimpleNamespace(names=("age",))
 
     def carried_mm(self, origins_mm, covariates, latents):
