@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
 
 SHOWN_FACES = 20_000
 """A scan is thinned to so many for display and for its distances to a shape; the fit uses all of it."""
+
+SHOWN_SEGMENTS = 2000
+"""The same of an outline, which is filled in the window's thread."""
 
 SHOWN_POINTS = SHOWN_FACES // 2
 FIT_SHARE = 0.8
@@ -151,7 +155,7 @@ def _scan(taken: Intake) -> Scan:
     from naisr_model.data.remarks import SEVERITIES
 
     whole = taken.patient
-    thin, dim = _thin(whole), whole.mesh_mm.vertices.shape[1]
+    thin, dim = _thin(whole), whole.dim
     said = {
         severity: [one.text for one in taken.remarks if one.severity == severity] for severity in SEVERITIES
     }
@@ -172,11 +176,14 @@ def _scan(taken: Intake) -> Scan:
 
 
 def _thin(whole: PatientShape) -> PatientShape:
-    """A surface of many triangles for display; a curve as it is."""
+    """A surface of many triangles, or a curve of many segments, for display."""
     from naisr_model.data.patients import decimated
+    from naisr_model.shapes.curve import Curve, thinned
 
-    is_large = len(whole.mesh_mm.faces) > SHOWN_FACES and whole.mesh_mm.vertices.shape[1] == 3
-    return decimated(whole, SHOWN_FACES) if is_large else whole
+    shape = whole.mesh_mm
+    if isinstance(shape, Curve):
+        return replace(whole, mesh_mm=thinned(shape, SHOWN_SEGMENTS))
+    return decimated(whole, SHOWN_FACES) if len(shape.faces) > SHOWN_FACES else whole
 
 
 def _thinned(points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
