@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import MappingProxyType
 
 from naisr_model.errors import InputError
 
 _ROOT = Path(__file__).parents[1]
 _PLACES = (_ROOT / "resources", _ROOT / "naisr_viewer" / "_resources")
 """In a checkout, and in an installation."""
+
+
+ATLASES = MappingProxyType(
+    {
+        "airway": "Airways of children",
+        "bodies": "Bodies of all ages",
+        "starman": "Little men in the plane",
+    }
+)
+"""The atlases that come with the program, by the names of their files, and what they are of."""
 
 
 def shipped(name: str) -> Path:
@@ -23,10 +34,10 @@ def shipped(name: str) -> Path:
     return found
 
 
-def shipped_atlas() -> Path:
-    """The airway atlas that comes with the program.
+def shipped_atlas(name: str = "airway") -> Path:
+    """One of the :data:`ATLASES` that come with the program.
 
     Raises:
         InputError: when it was not installed.
     """
-    return shipped("airway.safetensors")
+    return shipped(f"{name}.safetensors")

@@ -10,7 +10,16 @@ from pathlib import Path
 import pytest
 import torch
 import trimesh
-from eggs import egg, egg_asdf_preset, egg_deepsdf_preset, egg_joint_preset, egg_preset, moved_as_in
+from eggs import (
+    egg,
+    egg_asdf_preset,
+    egg_deepsdf_preset,
+    egg_joint_preset,
+    egg_preset,
+    ellipse,
+    ellipse_preset,
+    moved_as_in,
+)
 from filelock import FileLock
 
 from naisr_model.checkpoint import save
@@ -18,6 +27,7 @@ from naisr_model.config import Preset
 from naisr_model.data.prepare import PrepareOptions, prepare
 from naisr_model.data.store import SampleStore
 from naisr_model.learning.training.loop import train
+from naisr_model.shapes.written import csv_bytes
 
 
 @pytest.fixture(autouse=True, scope="session")
@@ -70,6 +80,24 @@ def egg_store(egg_table: Path, made_once) -> SampleStore:
     """The eggs prepared for training."""
     options = PrepareOptions(2000, 2000, 2000, workers=1)
     return SampleStore.open(made_once("egg-store", lambda out: prepare(egg_table, out, options=options)))
+
+
+@pytest.fixture(scope="session")
+def ellipses(made_once) -> Path:
+    """A folder with twenty curves ``c0.csv`` ..., their store, and an atlas of them, ``a.safetensors``."""
+
+    def make(folder: Path) -> None:
+        lines = ["mesh,subject,age [years]"]
+        for number in range(20):
+            age = 1 + 8 * number / 19
+            (folder / f"c{number}.csv").write_bytes(csv_bytes(ellipse(age)))
+            lines.append(f"c{number}.csv,s{number},{age}")
+        (folder / "ellipses.csv").write_text("\n".join(lines))
+        options = PrepareOptions(1000, 1000, 1000, 0.2, workers=1)
+        assert not prepare(folder / "ellipses.csv", folder / "store", options=options).rejected
+        train(SampleStore.open(folder / "store"), ellipse_preset(), folder / "a.safetensors")
+
+    return Path(made_once("ellipses", make))
 
 
 @pytest.fixture(scope="session")

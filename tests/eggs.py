@@ -22,6 +22,7 @@ from naisr_model.frames import Frame
 from naisr_model.models.factory import build, preset
 from naisr_model.models.naisr.network import NaisrConfig
 from naisr_model.models.single import SingleConfig
+from naisr_model.shapes.curve import Curve, closed
 
 RAS = np.diag([-1.0, -1.0, 1.0, 1.0])
 """LPS to RAS and back."""
@@ -32,6 +33,12 @@ def egg(age: float, sex: float) -> trimesh.Trimesh:
     mesh = trimesh.creation.icosphere(subdivisions=3)
     mesh.apply_scale([20 + 2 * sex, 20, 20 + 2 * age])
     return mesh
+
+
+def ellipse(age: float) -> Curve:
+    """20 mm wide; age, 1 to 9, makes it taller. Its area is pi 10 (10 + age) mm²."""
+    angles = np.linspace(0, 2 * np.pi, 120, endpoint=False)
+    return closed([np.stack([10 * np.cos(angles), (10 + age) * np.sin(angles)], axis=1)])
 
 
 def egg_preset(epochs: int, hidden_rate: float = 0.0) -> Preset:
@@ -51,6 +58,22 @@ def egg_preset(epochs: int, hidden_rate: float = 0.0) -> Preset:
         hidden_rate=hidden_rate,
     )
     return Preset("naisr", network, training)
+
+
+def ellipse_preset() -> Preset:
+    """The recipe for the plane on networks small enough for a test."""
+    training = dataclasses.replace(
+        preset("starman-demo").training,
+        epochs=250,
+        batch_shapes=8,
+        template_rate=2e-3,
+        displacement_rate=2e-3,
+        template_epochs=(1,),
+    )
+    small = NaisrConfig(
+        dim=2, latent=2, template=SirenConfig(32, 1, omega0=5.0), displacement=SirenConfig(16, 1, omega0=2.0)
+    )
+    return Preset("naisr", small, training)
 
 
 def egg_joint_preset(epochs: int) -> Preset:

@@ -65,13 +65,14 @@ class Rule:
 
 
 COVARIATES = "naisr_model.covariates"
-VOCABULARY = (COVARIATES, "naisr_model.capabilities")
+VOCABULARY = (COVARIATES, "naisr_model.capabilities", "naisr_model.frames")
 LIGHT = tuple(
     f"naisr_model.{name}"
     for name in ("errors", "exports", "files", "progress", "records", "shipped", "terminal")
 )
 """What anybody may use."""
 
+DRAWS_CURVES = ("naisr_viewer.files.surfaces", "naisr_viewer.files.figure")
 CANVAS = "naisr_viewer.views.shapes.canvas"
 NO_QT = tuple(f"naisr_viewer.{room}*" for room in ("state", "words", "engine", "panels", "files"))
 SPEAKS_OF_COVARIATES = tuple(
@@ -98,7 +99,18 @@ RULES = (
         allowed=LIGHT,
         but_not=("naisr_viewer.engine*", *SPEAKS_OF_COVARIATES),
     ),
-    Rule(SPEAKS_OF_COVARIATES, ("naisr_model",), allowed=(*LIGHT, *VOCABULARY)),
+    Rule(
+        SPEAKS_OF_COVARIATES,
+        ("naisr_model",),
+        allowed=(*LIGHT, *VOCABULARY),
+        but_not=DRAWS_CURVES,
+    ),
+    # Curves have no library of their own, as surfaces have trimesh.
+    Rule(
+        DRAWS_CURVES,
+        ("naisr_model",),
+        allowed=(*LIGHT, *VOCABULARY, "naisr_model.shapes"),
+    ),
     Rule(("naisr_viewer*",), ("torch",)),
     Rule(("naisr_viewer*",), ("pyvistaqt",), but_not=(CANVAS,)),
     Rule(("naisr_viewer*",), ("pyqtgraph",), but_not=("naisr_viewer.views.charts*",)),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from naisr_model.atlas import VOLUME_RESOLUTION, Atlas, Individual
 from naisr_model.covariates import Values, normalised_vector
 from naisr_model.errors import InputError
-from naisr_model.measures.kinds import MEASURES, Measure, Surface, surface_of
+from naisr_model.measures.kinds import MEASURES, Measure, Surface, measures_of, surface_of
 from naisr_model.progress import SILENT, Progress
 from naisr_model.surface.tracking import Tracked, Tracker
 
@@ -32,17 +32,19 @@ class Gauge:
     Attributes:
         fine: the template.
         coarse: the same with fewer vertices; to be carried to the shapes.
+        known: what could be measured, by name.
     """
 
     fine: Surface
     coarse: Surface
+    known: Mapping[str, Measure] = field(default_factory=lambda: MEASURES)
 
     @cached_property
     def measures(self) -> Mapping[str, Measure]:
         """Those that these shapes have, by name."""
         both = (self.fine, self.coarse)
         return MappingProxyType(
-            {name: one for name, one in MEASURES.items() if all(map(one.is_possible, both))}
+            {name: one for name, one in self.known.items() if all(map(one.is_possible, both))}
         )
 
     def curve(self, measure: Measure, shapes: Iterable[Surface]) -> NDArray[np.float64]:
@@ -69,7 +71,7 @@ def gauge_of(atlas: Atlas, *, progress: Progress = SILENT) -> Gauge:
     """
     sizes = (VOLUME_RESOLUTION, COARSE)
     fine, coarse = (template_of(atlas, size, progress=piece) for size, piece in progress.over(sizes))
-    return Gauge(fine, coarse)
+    return Gauge(fine, coarse, measures_of(atlas.frame))
 
 
 def template_of(atlas: Atlas, resolution: int, *, progress: Progress = SILENT) -> Surface:

@@ -11,19 +11,19 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike, NDArray
 
-from naisr_model.errors import InputError
+from naisr_model.frames import Frame
 from naisr_model.measures.tubes import Tube, tube_of
-from naisr_model.shapes.kinds import kind_of
-from naisr_model.surface.volume import enclosed_volume
+from naisr_model.shapes.kinds import KINDS, Shape, kind_of
+from naisr_model.surface.volume import enclosed, enclosed_volume
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """What is measured: the surface of one shape, millimetres.
+    """What is measured: the surface of one shape, or its curve in the plane, millimetres.
 
     Attributes:
-        points_mm: vertices, ``[n, 3]``.
-        faces: vertex numbers of the triangles, outward by the right hand, ``[m, 3]``.
+        points_mm: vertices, ``[n, dim]``.
+        faces: vertex numbers of the triangles, outward by the right hand, or of the segments, ``[m, dim]``.
         is_closed: whether it bounds a body.
         tube: its stations; None where it is not tube-like.
     """
@@ -34,25 +34,19 @@ class Surface:
     tube: Tube | None
 
     def moved(self, points_mm: NDArray[np.floating]) -> Surface:
-        """The same material with its vertices elsewhere, ``[n, 3]``."""
+        """The same material with its vertices elsewhere, ``[n, dim]``."""
         return replace(self, points_mm=points_mm)
 
     @property
-    def mesh(self) -> trimesh.Trimesh:
-        """As a mesh with the same vertices."""
-        return trimesh.Trimesh(self.points_mm, self.faces, process=False)
+    def mesh(self) -> Shape:
+        """As a mesh or a curve with the same vertices."""
+        return KINDS[self.points_mm.shape[1]].made(np.asarray(self.points_mm, dtype=np.float64), self.faces)
 
 
-def surface_of(mesh: trimesh.Trimesh) -> Surface:
-    """A mesh in millimetres, with stations of its own where it is tube-like.
-
-    Raises:
-        InputError: for a curve in the plane.
-    """
-    if kind_of(mesh).dim != 3:
-        raise InputError(
-            "surfaces alone are measured so; the area of a curve is told by 'naisr fit' and 'mesh'"
-        )
+def surface_of(mesh: Shape) -> Surface:
+    """A mesh or a curve in millimetres, the mesh with stations of its own where it is tube-like."""
+    if kind_of(mesh).dim == 2:
+        return Surface(mesh.vertices, mesh.faces, len(mesh.faces) > 0, None)
     return Surface(mesh.vertices, np.asarray(mesh.faces), bool(mesh.is_watertight), tube_of(mesh))
 
 
@@ -140,6 +134,29 @@ MEASURES: Mapping[str, Measure] = MappingProxyType(
 """By name. A new one is positive for every shape that has it: norms compare its logarithms."""
 
 
+def measures_of(frame: Frame) -> Mapping[str, Measure]:
+    """What can be measured of the shapes in a frame, by name: :data:`MEASURES`, or what curves have."""
+    if frame.dim == 3:
+        return MEASURES
+    area = Measure(
+        "area",
+        "Area",
+        frame.extent.unit,
+        "inside the smooth curve through the vertices",
+        lambda curve: enclosed(curve.mesh),
+        lambda curve: curve.is_closed,
+    )
+    length = Measure(
+        "length",
+        "Length of the outline",
+        frame.unit,
+        "of all segments",
+        lambda curve: float(curve.mesh.area),
+        lambda curve: len(curve.faces) > 0,
+    )
+    return MappingProxyType({measure.name: measure for measure in (area, length)})
+
+
 @dataclass(frozen=True)
 class Anchor:
     """A material point: a place on a triangle of the template.
@@ -153,7 +170,7 @@ class Anchor:
     weights: tuple[float, float, float]
 
     def place_mm(self, surface: Surface) -> NDArray[np.float64]:
-        """Where it is in a shape with the template's vertices, ``[3]``."""
+        """Where it is in a shape with the template's vertices, ``[dim]``."""
         return np.asarray(np.array(self.weights) @ surface.points_mm[list(self.corners)], dtype=np.float64)
 
 
@@ -169,12 +186,12 @@ def anchor(template: Surface, point_mm: ArrayLike) -> Anchor:
     return Anchor((a, b, c), (u, v, w))
 
 
-def distance(first: Anchor, second: Anchor) -> Measure:
-    """How far apart two material points are, in a straight line."""
+def distance(first: Anchor, second: Anchor, *, unit: str = "mm") -> Measure:
+    """How far apart two material points are, in a straight line and in the unit of their frame."""
     return Measure(
         "distance",
         "Distance",
-        "mm",
+        unit,
         "between two material points, in a straight line",
         lambda shape: float(np.linalg.norm(first.place_mm(shape) - second.place_mm(shape))),
         lambda shape: len(shape.points_mm) > max(*first.corners, *second.corners),

@@ -328,10 +328,14 @@ def norms_of(atlas: Atlas, *, progress: Progress = SILENT) -> Norms:
     """What is usual among the people of an atlas; takes the better part of a minute.
 
     Raises:
-        InputError: when they are too few or all alike, where the model deforms no template, or where it
-            folds.
+        InputError: when they are too few or all alike, where the model deforms no template, where it folds,
+            or where it is one of curves.
         Cancelled: when nobody waits any more.
     """
+    if atlas.frame.dim != 3:
+        raise InputError(
+            "surfaces alone are measured so; the area of a curve is told by 'naisr fit' and 'mesh'"
+        )
     gauge = gauge_of(atlas, progress=progress.quiet)
     people = people_of(atlas, gauge.coarse, progress=progress.part(0.0, RECONSTRUCTED))
     own, usual = (

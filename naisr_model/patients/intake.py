@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from naisr_model.atlas import Atlas
 from naisr_model.covariates import Values
-from naisr_model.data import volumes
+from naisr_model.data import curves, volumes
 from naisr_model.data.align import (
     Landmarks,
     Method,
@@ -154,8 +154,12 @@ def take_in(
     return intake
 
 
-def labels(path: str | Path) -> dict[int | str, str] | None:
+def labels(path: str | Path, dim: int = 3) -> dict[int | str, str] | None:
     """What :func:`read` may be asked for: of a label volume its labels, each with its name and size.
+
+    Args:
+        path: the file.
+        dim: 2 for an atlas of curves, whose labels are in images.
 
     Returns:
         A title by label, as ``{2: "2 'airway': 41.9 cm³"}``, empty where every voxel is 0; None of a file
@@ -164,18 +168,28 @@ def labels(path: str | Path) -> dict[int | str, str] | None:
     Raises:
         InputError: when a label volume cannot be used.
     """
+    if dim == 2:
+        return dict(curves.labels_in(Path(path)).items()) if curves.is_image(Path(path)) else None
     if not volumes.is_label_volume(path):
         return None
     return volumes.titles(Path(path).name, volumes.read_labels(path))
 
 
-def require_label(path: str | Path, label: int | str | None) -> None:
+def require_label(path: str | Path, label: int | str | None, dim: int = 3) -> None:
     """Make sure that it is clear what :func:`read` reads of a label volume; other files are left alone.
+
+    Args:
+        path: the file.
+        label: which label was chosen.
+        dim: 2 for an atlas of curves, whose labels are in images.
 
     Raises:
         InputError: naming the labels, when it is not, or when the volume cannot be used.
     """
-    if volumes.is_label_volume(path):
+    if dim == 2:
+        if curves.is_image(Path(path)):
+            curves.sound_curve(path, label)
+    elif volumes.is_label_volume(path):
         volumes.choose(Path(path).name, volumes.read_labels(path), label)
 
 

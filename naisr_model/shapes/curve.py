@@ -19,6 +19,9 @@ from scipy.sparse.csgraph import connected_components
 
 Points = NDArray[np.float64]
 
+FEWEST_LEFT = 8
+"""Vertices of a polygon that are left when a curve is thinned."""
+
 CORNER = 1e-9
 """Share of a segment within which its end is meant."""
 
@@ -155,6 +158,15 @@ def closed(loops: Sequence[Points]) -> Curve:
     ]
     vertices = np.concatenate([np.zeros((0, 2)), *loops])
     return Curve(vertices, np.concatenate([np.zeros((0, 2), np.int64), *turned]))
+
+
+def thinned(curve: Curve, most: int) -> Curve:
+    """A curve with about as many vertices as are wanted at most; itself where it has no more."""
+    step = -(-len(curve.vertices) // most)
+    if step == 1:
+        return curve
+    loops = [loop[:: min(step, max(1, len(loop) // FEWEST_LEFT))] for loop in curve.loops]
+    return closed([curve.vertices[loop] for loop in loops])
 
 
 def _ring(size: int) -> NDArray[np.int64]:

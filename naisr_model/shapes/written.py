@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
 
 from naisr_model.exports import MeshFormat, mesh_bytes
 from naisr_model.shapes.curve import Curve
 
 WRITTEN = 12
 """Digits of a coordinate."""
+
+MEASURED = 7
+"""Digits of what is known at a vertex."""
 
 
 def shape_bytes(shape: Any, ending: str, unit: str = "mm") -> bytes:
@@ -24,11 +32,19 @@ def shape_bytes(shape: Any, ending: str, unit: str = "mm") -> bytes:
     return svg_bytes(shape, unit) if ending == "svg" else mesh_bytes(shape, cast(MeshFormat, ending))
 
 
-def csv_bytes(curve: Curve) -> bytes:
-    """The curve as text: a line x,y,piece a vertex, each polygon closed by its first vertex being meant."""
-    lines = ["x,y,piece"]
+def csv_bytes(curve: Curve, numbers: Mapping[str, NDArray[np.floating]] = MappingProxyType({})) -> bytes:
+    """The curve as text: a line x,y,piece a vertex, each polygon closed by its first vertex being meant.
+
+    Args:
+        curve: in any unit.
+        numbers: what else is known at the vertices, ``[n]``, by the name of its column.
+    """
+    lines = [",".join(["x", "y", "piece", *numbers])]
     for number, loop in enumerate(curve.loops, start=1):
-        lines += [f"{x:.{WRITTEN}g},{y:.{WRITTEN}g},{number}" for x, y in curve.vertices[loop].tolist()]
+        known = [values[loop].tolist() for values in numbers.values()]
+        for (x, y), *more in zip(curve.vertices[loop].tolist(), *known, strict=True):
+            told = [f"{each:.{MEASURED}g}" for each in more]
+            lines.append(",".join([f"{x:.{WRITTEN}g}", f"{y:.{WRITTEN}g}", str(number), *told]))
     return ("\n".join(lines) + "\n").encode()
 
 

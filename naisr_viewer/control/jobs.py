@@ -8,6 +8,7 @@ from itertools import chain
 from pathlib import Path
 from threading import Event
 
+from naisr_model.exports import CURVE_FORMATS
 from naisr_model.files import write_all
 from naisr_model.progress import Progress
 from naisr_viewer.control.worker import Deliver, Job
@@ -50,7 +51,8 @@ class ExportReport:
     @property
     def sentence(self) -> str:
         """What the status line says."""
-        surfaces = "1 surface" if self.count == 1 else f"{self.count} surfaces"
+        what = "curve" if self.choice.format in CURVE_FORMATS else "surface"
+        surfaces = f"1 {what}" if self.count == 1 else f"{self.count} {what}s"
         surfaces = f"a figure and {surfaces}" if self.choice.figure else surfaces
         return f"Exported {surfaces} as {self.choice.format.upper()} to {self.choice.folder}"
 
@@ -122,7 +124,7 @@ def preparing(engine: Engine, path: Path, person: int) -> Job[None]:
 def reading(clinic: Clinic, atlas: Path, wanted: Reading, known: Named) -> Job[Scan | Labels]:
     """Reads a patient's file; hands over the scan, or the labels that are to be chosen from first."""
     return lambda deliver, progress: deliver(
-        clinic.labels(wanted) or clinic.read(atlas, wanted, known, progress)
+        clinic.labels(atlas, wanted) or clinic.read(atlas, wanted, known, progress)
     )
 
 

@@ -92,7 +92,7 @@ class Atlases:
         """What :meth:`begin` takes: a file read afresh.
 
         Raises:
-            InputError: when there is no such file or it is not an atlas of surfaces.
+            InputError: when there is no such file or it is not an atlas.
         """
         require_file(path, "an atlas (.safetensors)")
         written = stamp_of(path)
@@ -100,14 +100,10 @@ class Atlases:
         if (kept := self._cache.opening(fingerprint, path)) is not None:
             return Opened(replace(kept.card, written=written), fingerprint, kept.picture), None
         atlas = self._load(path)
-        if atlas.frame.dim != 3:
-            raise InputError(
-                f"{path.name} is an atlas of curves in the plane, and the window shows surfaces; use the "
-                "commands, as 'naisr mesh'"
-            )
         if fingerprint_of(path) != fingerprint:  # replaced meanwhile, as a training does now and then
             return self.read(path)
-        card = AtlasCard(path, atlas.name, atlas.covariates, atlas.population, atlas.capabilities, written)
+        people, frame = atlas.population, atlas.frame
+        card = AtlasCard(path, atlas.name, atlas.covariates, people, atlas.capabilities, frame, written)
         return Opened(card, fingerprint, None), atlas
 
     def begin(self, opened: Opened, atlas: Atlas | None) -> list[Path]:

@@ -26,6 +26,7 @@ from naisr_model.capabilities import Capabilities
 from naisr_model.covariates import Population
 from naisr_model.errors import InputError
 from naisr_model.files import replacing, sha256_of, sources_digest
+from naisr_model.frames import Frame
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.layouts import FULL_SHAPE, TEMPLATE
 from naisr_viewer.state.requests import EXACT_RESOLUTION, Origin, SurfaceRequest, SurfaceResult
@@ -158,7 +159,8 @@ def _write_opening(file: Path, opening: Opening) -> None:
         "name": card.name,
         "population": card.population.to_json(),
         "capabilities": dataclasses.asdict(card.capabilities),
-        "volume_cm3": picture.volume_cm3,
+        "frame": card.frame.to_json(),
+        "extent": picture.extent,
         "seconds": picture.seconds,
     }
     np.savez(
@@ -170,14 +172,14 @@ def _write_opening(file: Path, opening: Opening) -> None:
     )
 
 
-def _require_surface(picture: SurfaceResult) -> None:
-    """Make sure that a surface can be drawn: whoever draws it asks no more.
+def _require_surface(picture: SurfaceResult, dim: int) -> None:
+    """Make sure that a surface or a curve can be drawn: whoever draws it asks no more.
 
     Raises:
         ValueError: when it is none.
     """
     points, normals, faces = picture.points_mm, picture.normals, picture.faces
-    arrays = [array.ndim == 2 and array.shape[1] == 3 for array in (points, normals, faces)]
+    arrays = [array.ndim == 2 and array.shape[1] == dim for array in (points, normals, faces)]
     if not all(arrays) or len(points) != len(normals) or not np.isfinite(points).all():
         raise ValueError("its points are none")
     if faces.size and not 0 <= faces.min() <= faces.max() < len(points):
@@ -195,17 +197,19 @@ def _read_opening(file: Path, atlas: Path) -> Opening:
             record = json.loads(str(arrays["record"]))
             population = Population.from_json(record["population"])
             capabilities = Capabilities(**record["capabilities"])
-            card = AtlasCard(atlas, str(record["name"]), population.covariates, population, capabilities)
+            frame = Frame.from_json(record["frame"])
+            name, covariates = str(record["name"]), population.covariates
+            card = AtlasCard(atlas, name, covariates, population, capabilities, frame)
             picture = SurfaceResult(
                 request=first_picture(card),
                 points_mm=arrays["points_mm"],
                 normals=arrays["normals"],
                 faces=arrays["faces"],
-                volume_cm3=float(record["volume_cm3"]),
+                extent=float(record["extent"]),
                 seconds=float(record["seconds"]),
                 origin=Origin.NETWORK,
             )
-        _require_surface(picture)
+        _require_surface(picture, card.frame.dim)
     except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile, zlib.error) as error:
         raise InputError(f"{file} does not hold the opening of an atlas ({error})") from error
     return Opening(card, picture)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
@@ -13,15 +14,20 @@ from numpy.typing import NDArray
 from naisr_model.progress import SILENT, Progress
 from naisr_viewer.engine.engine import Engine
 from naisr_viewer.engine.people import FittedPerson
+from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.layouts import FULL_SHAPE
 from naisr_viewer.state.patients import Fitted, Labels, Named, Reading, Scan
 from naisr_viewer.state.requests import EXACT_RESOLUTION, SurfaceRequest, SurfaceResult
 
 if TYPE_CHECKING:
+    from naisr_model.data.patients import PatientShape
     from naisr_model.patients.intake import Intake
 
 SHOWN_FACES = 20_000
 """A scan is thinned to so many for display and for its distances to a shape; the fit uses all of it."""
+
+SHOWN_SEGMENTS = 2000
+"""The same of an outline, which is filled in the window's thread."""
 
 SHOWN_POINTS = SHOWN_FACES // 2
 FIT_SHARE = 0.8
@@ -39,7 +45,7 @@ class Clinic:
         self._engine = engine
         self._intakes: WeakKeyDictionary[Scan, Intake] = WeakKeyDictionary()
 
-    def labels(self, reading: Reading) -> Labels | None:
+    def labels(self, atlas: Path, reading: Reading) -> Labels | None:
         """What to choose from, where none is chosen and it is not clear which label is meant.
 
         Raises:
@@ -47,11 +53,12 @@ class Clinic:
         """
         from naisr_model.patients import intake
 
-        titles = intake.labels(reading.path) if reading.label is None else None
+        dim = self._engine.card_of(atlas).frame.dim
+        titles = intake.labels(reading.path, dim) if reading.label is None else None
         return Labels(reading, tuple(titles.items())) if titles and not _is_clear(titles) else None
 
     @staticmethod
-    def require_label(reading: Reading) -> None:
+    def require_label(reading: Reading, card: AtlasCard | None) -> None:
         """Make sure that it is clear which label is meant, where nobody can be asked.
 
         Raises:
@@ -59,7 +66,7 @@ class Clinic:
         """
         from naisr_model.patients import intake
 
-        intake.require_label(reading.path, reading.label)
+        intake.require_label(reading.path, reading.label, 3 if card is None else card.frame.dim)
 
     def read(self, atlas: Path, reading: Reading, known: Named, progress: Progress = SILENT) -> Scan:
         """Read a patient's file as asked and bring it into the frame of an open atlas.
@@ -126,8 +133,8 @@ def _told(person: FittedPerson, number: int, surface: SurfaceResult) -> Fitted:
         person=number,
         values=surface.request.values,
         intervals=tuple((name, *ends) for name, ends in fit.intervals.items()),
-        volume_cm3=surface.volume_cm3,
-        volume_margin_cm3=surface.volume_margin_cm3,
+        extent=surface.extent,
+        extent_margin=surface.extent_margin,
         residual_mm=fit.residual_mm,
         lasting=fit.lasting if person.atlas_model.capabilities.transferable else None,
         seconds=fit.seconds,
@@ -145,11 +152,10 @@ def _is_clear(titles: Mapping[int | str, str]) -> bool:
 
 def _scan(taken: Intake) -> Scan:
     """A scan as the window shows it."""
-    from naisr_model.data.patients import decimated
     from naisr_model.data.remarks import SEVERITIES
 
     whole = taken.patient
-    thin = decimated(whole, SHOWN_FACES) if len(whole.mesh_mm.faces) > SHOWN_FACES else whole
+    thin, dim = _thin(whole), whole.dim
     said = {
         severity: [one.text for one in taken.remarks if one.severity == severity] for severity in SEVERITIES
     }
@@ -158,15 +164,26 @@ def _scan(taken: Intake) -> Scan:
     return Scan(
         points_mm=np.array(points_mm, np.float32),  # a plain array: trimesh's own remember their mesh
         normals=np.array(normals, np.float32),
-        faces=np.asarray(thin.mesh_mm.faces, np.int64).reshape(-1, 3),
+        faces=np.asarray(thin.mesh_mm.faces, np.int64).reshape(-1, dim),
         source=whole.source,
-        volume_cm3=whole.volume_cm3,
+        extent=taken.own_extent,
         alignment=taken.alignment,
         notes=tuple(said["look"]),
         repairs=tuple(said["fine"]),
         blocked=" ".join(said["refuse"]),
-        is_astray=any(one.topic in ("astray", "far") for one in taken.found),
+        is_astray=dim == 3 and any(one.topic in ("astray", "far") for one in taken.found),
     )
+
+
+def _thin(whole: PatientShape) -> PatientShape:
+    """A surface of many triangles, or a curve of many segments, for display."""
+    from naisr_model.data.patients import decimated
+    from naisr_model.shapes.curve import Curve, thinned
+
+    shape = whole.mesh_mm
+    if isinstance(shape, Curve):
+        return replace(whole, mesh_mm=thinned(shape, SHOWN_SEGMENTS))
+    return decimated(whole, SHOWN_FACES) if len(shape.faces) > SHOWN_FACES else whole
 
 
 def _thinned(points_mm: NDArray[np.float64]) -> NDArray[np.float64]:

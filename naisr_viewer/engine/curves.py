@@ -185,7 +185,7 @@ def _seen(atlas: Atlas, gauge: Gauge, person: Individual) -> Seen:
         shapes_along(atlas, template, [person.covariates], person)[0]
         for template in (gauge.fine, gauge.coarse)
     )
-    own, found = Gauge(fine, coarse), margins(person, coarse, gauge.measures)
+    own, found = Gauge(fine, coarse, gauge.known), margins(person, coarse, gauge.measures)
     sure = {name: found[name] * one.of(fine) / one.of(coarse) for name, one in gauge.measures.items()}
     return Seen(person.covariates, own, sure)
 
@@ -238,9 +238,11 @@ def _distance(
     from naisr_model.measures.kinds import Anchor, Surface, distance
     from naisr_model.measures.norms import people_of, spread_of
 
-    points_mm = np.array([pin.origin_mm for pin in request.pins])
-    ends = Surface(points_mm, np.zeros((0, 3), dtype=np.int64), False, None)
-    measure = distance(*(Anchor((i, i, i), (1.0, 0.0, 0.0)) for i in range(2)))
+    dim, unit = atlas.frame.dim, atlas.frame.unit
+    points_mm = np.array([pin.origin_mm[:dim] for pin in request.pins])
+    ends = Surface(points_mm, np.zeros((0, dim), dtype=np.int64), False, None)
+    first, second = (Anchor((i, i, i), (1.0, 0.0, 0.0)) for i in range(2))
+    measure = distance(first, second, unit=unit)
     carried = _carried(atlas, ends, way, person, progress.part(0.0, 0.5))
     among: dict[str, Among] = {}
     if has_norms:

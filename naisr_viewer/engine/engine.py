@@ -62,7 +62,7 @@ class Engine:
         """Read ``path`` afresh and describe it.
 
         Raises:
-            InputError: when there is no such file or it is not an atlas of surfaces.
+            InputError: when there is no such file or it is not an atlas.
         """
         return self.begin(self.read(path))
 
@@ -70,7 +70,7 @@ class Engine:
         """What :meth:`begin` opens: a file read afresh; what is open stays so.
 
         Raises:
-            InputError: when there is no such file or it is not an atlas of surfaces.
+            InputError: when there is no such file or it is not an atlas.
         """
         return self._atlases.read(path)
 
@@ -90,7 +90,7 @@ class Engine:
         """Describe an atlas file; unless exactly that is open, it is opened. Who was fitted stays known.
 
         Raises:
-            InputError: when there is no such file or it is not an atlas of surfaces.
+            InputError: when there is no such file or it is not an atlas.
         """
         with contextlib.suppress(Cancelled):
             if (open_already := self._atlases[path]).fingerprint == fingerprint_of(path):
@@ -197,7 +197,7 @@ class Engine:
         """Make previews of a person fast: tabulate the displacements, or read them from the disk.
 
         The disk holds those of the population average; what the next run shows first is kept with them.
-        Where the shape model has no displacements to tabulate, previews stay coarse.
+        Where there are no displacements to tabulate, previews stay coarse; those of curves are fast anyway.
 
         Raises:
             Cancelled: when nobody waits any more.
@@ -214,7 +214,7 @@ class Engine:
         atlas, shown = self.atlas(path), self.surface(first_picture(opened.card), progress.quiet)
         if len(shown.faces) and opened.picture is None:
             self._cache.keep_opening(opened.fingerprint, Opening(opened.card, shown))
-        if not len(shown.faces) or not opened.card.capabilities.trackable:
+        if not len(shown.faces) or not opened.card.is_tabulated:
             return
         template = trimesh.Trimesh(shown.points_mm, shown.faces, process=False)
         tracker: Tracker

@@ -35,7 +35,8 @@ def origin_mm(source: Source, request: SurfaceRequest, point_mm: Point) -> Point
     """
     latent = _latent(source, request.atlas, Shown(request.panel, request.values, request.person))
     atlas = source.atlas(request.atlas)
-    return as_point(atlas.origins_mm([point_mm], dict(request.values), latent)[0])
+    place_mm = point_mm[: atlas.frame.dim]
+    return as_point(atlas.origins_mm([place_mm], dict(request.values), latent)[0])
 
 
 def ledger(source: Source, request: LedgerRequest) -> Ledger:
@@ -63,11 +64,14 @@ def ledger(source: Source, request: LedgerRequest) -> Ledger:
 def _found(
     atlas: Atlas, pins: Sequence[Pin], shapes: Sequence[Shown], latents: Sequence[Code]
 ) -> list[tuple[Entry, NDArray[np.float64]]]:
-    """What is told of each pin, and where it is in every shape, ``[shapes, 3]``.
+    """What is told of each pin, and where it is in every shape, ``[shapes, dim]``.
 
     A pin at which a deformation folds is left out.
     """
-    origins_mm, values = [pin.origin_mm for pin in pins], [dict(shown.values) for shown in shapes]
+    origins_mm, values = (
+        [pin.origin_mm[: atlas.frame.dim] for pin in pins],
+        [dict(shown.values) for shown in shapes],
+    )
     average = np.zeros_like(atlas.checkpoint.latents[0])
     codes = [average if latent is None else latent for latent in latents]
     try:
@@ -124,6 +128,6 @@ def _part(cause: str, moved_mm: NDArray[np.float64], normal: NDArray[np.float32]
 
 
 def as_point(point_mm: NDArray[np.float64]) -> Point:
-    """``[3]`` as a value that can be compared."""
-    x, y, z = point_mm.tolist()
+    """``[dim]`` as a value that can be compared; in the plane z is 0."""
+    x, y, z = [*point_mm.tolist(), 0.0][:3]
     return x, y, z

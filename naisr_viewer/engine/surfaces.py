@@ -13,24 +13,27 @@ from naisr_viewer.state.patients import Scan
 from naisr_viewer.state.requests import Origin, SurfaceRequest, SurfaceResult
 
 if TYPE_CHECKING:
-    import trimesh
-
     from naisr_model.atlas import Atlas
+    from naisr_model.frames import Frame
+    from naisr_model.shapes.kinds import Shape
     from naisr_model.surface.tracking import Tracked, Tracker
 
 
-def from_mesh(request: SurfaceRequest, mesh_mm: trimesh.Trimesh, start: float) -> SurfaceResult:
+def from_shape(request: SurfaceRequest, shape_mm: Shape, frame: Frame, start: float) -> SurfaceResult:
     """The answer to ``request`` that the networks gave, begun at ``start`` on the performance counter."""
-    empty = len(mesh_mm.faces) == 0
-    points_mm = np.zeros((0, 3)) if empty else np.asarray(mesh_mm.vertices)
-    normals = np.zeros((0, 3)) if empty else np.asarray(mesh_mm.vertex_normals)
-    faces = np.asarray(mesh_mm.faces, dtype=np.int64).reshape(-1, 3)
+    from naisr_model.surface.volume import enclosed
+
+    empty = len(shape_mm.faces) == 0
+    nothing = np.zeros((0, frame.dim))
+    points_mm = nothing if empty else np.asarray(shape_mm.vertices)
+    normals = nothing if empty else np.asarray(shape_mm.vertex_normals)
+    faces = np.asarray(shape_mm.faces, dtype=np.int64).reshape(-1, frame.dim)
     return SurfaceResult(
         request=request,
         points_mm=points_mm.astype(np.float32),
         normals=normals.astype(np.float32),
         faces=faces,
-        volume_cm3=volume_cm3(points_mm, normals, faces),
+        extent=0.0 if empty else enclosed(shape_mm) / frame.extent.per_unit,
         seconds=time.perf_counter() - start,
         origin=Origin.NETWORK,
     )
@@ -43,7 +46,7 @@ def from_tracked(request: SurfaceRequest, tracker: Tracker, tracked: Tracked, st
         points_mm=tracked.points_mm,
         normals=tracked.normals,
         faces=tracker.faces,
-        volume_cm3=volume_cm3(tracked.points_mm, tracked.normals, tracker.faces),
+        extent=volume_cm3(tracked.points_mm, tracked.normals, tracker.faces),
         seconds=time.perf_counter() - start,
         origin=Origin.TABLES,
         doubtful=not tracked.is_trustworthy,
@@ -57,7 +60,7 @@ def from_scan(request: SurfaceRequest, scan: Scan, start: float) -> SurfaceResul
         points_mm=scan.points_mm,
         normals=scan.normals,
         faces=scan.faces,
-        volume_cm3=scan.volume_cm3 or 0.0,
+        extent=scan.extent or 0.0,
         seconds=time.perf_counter() - start,
         origin=Origin.MEASURED,
     )
@@ -80,19 +83,18 @@ def deviation_mm(points_mm: NDArray[np.float32], exact: SurfaceResult) -> float:
 
 
 def outside_mm(one: SurfaceResult | Scan, other: SurfaceResult | Scan) -> NDArray[np.float32]:
-    """Distance of the vertices of one surface to another surface, positive outside it, ``[n]``."""
-    import trimesh
+    """Distance of the vertices of one shape to another shape, positive outside it, ``[n]``."""
+    from naisr_model.shapes.kinds import KINDS
 
-    from naisr_model.data.samples import signed_distance
-
-    mesh_mm = trimesh.Trimesh(other.points_mm, other.faces, process=False)
-    return signed_distance(mesh_mm, one.points_mm.astype(np.float64)).astype(np.float32)
+    kind = KINDS[other.points_mm.shape[1]]
+    shape_mm = kind.made(other.points_mm.astype(np.float64), other.faces)
+    return kind.distances(shape_mm, one.points_mm.astype(np.float64)).astype(np.float32)
 
 
 def at_nearest(
     places: NDArray[np.float32], values: NDArray[np.float32], points: NDArray[np.float32]
 ) -> NDArray[np.float32]:
-    """The value at the nearest of ``places [n, 3]`` for each of ``points [m, 3]``."""
+    """The value at the nearest of ``places [n, dim]`` for each of ``points [m, dim]``."""
     from scipy.spatial import cKDTree
 
     result: NDArray[np.float32] = values[cKDTree(places).query(points)[1]]

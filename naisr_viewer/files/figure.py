@@ -22,6 +22,7 @@ from naisr_viewer.state.requests import SurfaceResult
 from naisr_viewer.words.matrix import Heads
 
 if TYPE_CHECKING:
+    from matplotlib.collections import Collection
     from matplotlib.figure import Figure
 
 DOTS_PER_INCH = 300
@@ -41,6 +42,9 @@ ROOM = 1.08
 
 AMBIENT, DIFFUSE = 0.3, 0.75
 """Light on a surface, from where it is seen."""
+
+OUTLINE, OUTLINE_PT = 0.55, 0.7
+"""How dark a curve is against what it encloses, and how wide."""
 
 LINE, INK, GREY = "#c9cdd4", "#1d2430", "#667085"
 
@@ -81,7 +85,8 @@ class MatrixFigure:
         heads: at their ends.
         plates: the cells.
         note: beneath all of it.
-        camera: from where the shapes are seen; how near it is does not matter.
+        camera: from where surfaces are seen; how near it is does not matter.
+        unit: of length.
     """
 
     across: str
@@ -90,6 +95,7 @@ class MatrixFigure:
     plates: Mapping[Cell, Plate]
     note: str
     camera: Camera
+    unit: str
 
 
 def figure_bytes(figure: MatrixFigure, ending: str, progress: Progress = SILENT) -> bytes:
@@ -121,32 +127,57 @@ def as_seen(vectors: NDArray[np.floating], camera: Camera) -> NDArray[np.float64
     return seen
 
 
+def points_seen(surface: SurfaceResult, camera: Camera) -> NDArray[np.floating]:
+    """Its vertices to the right and upwards, ``[n, 2]``; curves in the plane are seen as they are."""
+    return surface.points_mm if surface.dim == 2 else as_seen(surface.points_mm, camera)[:, :2]
+
+
 def shape_image(surface: SurfaceResult, colour: str, camera: Camera, box: Box) -> NDArray[np.uint8]:
-    """A lit surface on nothing: red, green, blue and opacity, ``[dots, dots, 4]``.
+    """A lit surface on nothing, or what a curve encloses: red, green, blue and opacity, ``[dots, dots, 4]``.
 
     Triangles that face the eye are drawn from the farthest to the nearest.
     """
+    own = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
+    if surface.dim == 2:
+        return _averaged(_painted(_enclosed(surface, own), box))
     triangles = as_seen(surface.points_mm, camera)[surface.faces]
     edges = np.diff(triangles, axis=1)
     facing = np.flatnonzero(np.cross(edges[:, 0], edges[:, 1])[:, 2] > 0)
     order = facing[np.argsort(triangles[facing, :, 2].mean(axis=1))]
     light = as_seen(surface.normals, camera)[surface.faces[order]][..., 2].mean(axis=1).clip(0, 1)
-    own = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
     colours = (own * (AMBIENT + DIFFUSE * light)[:, None]).clip(0, 1)
-    return _averaged(_painted(triangles[order, :, :2], colours, box))
+    return _averaged(_painted(_triangles(triangles[order, :, :2], colours), box))
 
 
-def _painted(triangles: NDArray[np.float64], colours: NDArray[np.float64], box: Box) -> NDArray[np.uint8]:
+def _triangles(triangles: NDArray[np.float64], colours: NDArray[np.float64]) -> Collection:
     """Triangles ``[n, 3, 2]`` in their colours ``[n, 3]``, each over those before it."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.collections import PolyCollection
+
+    return PolyCollection(list(triangles), facecolors=colours, antialiased=False)
+
+
+def _enclosed(curve: SurfaceResult, colour: NDArray[np.float64]) -> Collection:
+    """What a curve encloses in a colour ``[3]``, without its holes, and the curve darker."""
+    from matplotlib.collections import PathCollection
+    from matplotlib.path import Path
+
+    from naisr_model.shapes.curve import Curve
+
+    loops = [np.append(loop, loop[:1]) for loop in Curve(curve.points_mm.astype(float), curve.faces).loops]
+    path = Path.make_compound_path(*(Path(curve.points_mm[loop], closed=True) for loop in loops))
+    return PathCollection([path], facecolors=[colour], edgecolors=[OUTLINE * colour], linewidths=OUTLINE_PT)
+
+
+def _painted(artist: Collection, box: Box) -> NDArray[np.uint8]:
+    """Shapes on a square sheet that holds a box."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     sheet = Figure((CELL_IN, CELL_IN), dpi=DOTS_PER_INCH * FINER)
     sheet.patch.set_alpha(0.0)
     axes = sheet.add_axes((0, 0, 1, 1), xlim=box[:2], ylim=box[2:])
     axes.set_axis_off()
-    axes.add_collection(PolyCollection(list(triangles), facecolors=colours, antialiased=False))
+    axes.add_collection(artist, autolim=False)
     canvas = FigureCanvasAgg(sheet)
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())
@@ -163,7 +194,7 @@ def _averaged(dots: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 def _common_box(figure: MatrixFigure) -> Box:
     """A square around all shapes as they are seen, so that they can be compared."""
-    seen = [as_seen(plate.surface.points_mm, figure.camera)[:, :2] for plate in figure.plates.values()]
+    seen = [points_seen(plate.surface, figure.camera) for plate in figure.plates.values()]
     points = np.concatenate(seen)
     low, high = points.min(axis=0), points.max(axis=0)
     (x, y), half = (low + high) / 2, ROOM * float((high - low).max()) / 2
@@ -213,7 +244,7 @@ def _drawn(figure: MatrixFigure, images: Mapping[Cell, NDArray[np.uint8]], box: 
         sheet.write(left + CELL_IN / 2, top + CELL_IN, lines, va="top", fontsize=7)
     _write_heads(sheet, figure)
     _rule(sheet, columns, rows)
-    _write_note(sheet, figure.note, (box[1] - box[0]) / CELL_IN)
+    _write_note(sheet, figure, (box[1] - box[0]) / CELL_IN)
     return sheet.figure
 
 
@@ -243,14 +274,14 @@ def _pen(place: int) -> tuple[str, float]:
     return (GREY, 1.0) if place == 1 else (LINE, 0.5)
 
 
-def _write_note(sheet: Sheet, note: str, mm_an_inch: float) -> None:
+def _write_note(sheet: Sheet, figure: MatrixFigure, mm_an_inch: float) -> None:
     """What all of it is of, and how long a round length is."""
     length_mm = _round_length(0.8 * CELL_IN * mm_an_inch)
     right, y = sheet.wide - RIGHT_IN, sheet.high - 0.3
     left = right - length_mm / mm_an_inch
     sheet.rule((left, right), (y, y), INK, 1.2)
-    sheet.write((left + right) / 2, y + 0.12, f"{length_mm:g} mm")
-    sheet.write(LEFT_IN, y, note, ha="left", color=GREY, fontsize=7)
+    sheet.write((left + right) / 2, y + 0.12, f"{length_mm:g} {figure.unit}")
+    sheet.write(LEFT_IN, y, figure.note, ha="left", color=GREY, fontsize=7)
 
 
 def _round_length(longest_mm: float) -> float:

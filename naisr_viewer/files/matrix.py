@@ -67,7 +67,8 @@ def figure_of(
         if (panel := surface.request.panel).cell is not None
     }
     across, down = label(state.matrix.across.covariate), label(state.matrix.down.covariate)
-    return MatrixFigure(across, down, heads(state.atlas, state.matrix), plates, note(state), choice.camera)
+    unit, ends = state.atlas.frame.unit, heads(state.atlas, state.matrix)
+    return MatrixFigure(across, down, ends, plates, note(state), choice.camera, unit)
 
 
 def write_matrix(

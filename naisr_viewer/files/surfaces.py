@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from naisr_model.covariates import Covariate
 from naisr_model.errors import InputError
-from naisr_model.exports import FORMATS, MeshFormat, format_named, mesh_bytes
+from naisr_model.exports import FORMATS, MeshFormat, format_named, mesh_bytes, require_format
 from naisr_viewer import __version__
 from naisr_viewer.panels.base import Numbers
 from naisr_viewer.panels.kinds import kind_of, title_of
@@ -25,9 +25,14 @@ from naisr_viewer.state.requests import Origin, SurfaceRequest, SurfaceResult
 if TYPE_CHECKING:
     import trimesh
 
+    from naisr_model.shapes.curve import Curve
+
 
 POINT_FORMATS = ("ply", "vtp")
 """Formats that hold a cloud of points, and numbers at the points."""
+
+NUMBERED_FORMATS = (*POINT_FORMATS, "csv")
+"""Formats that hold numbers at the points."""
 
 
 def surface_files(
@@ -40,8 +45,9 @@ def surface_files(
     """A surface and, beside it, a JSON record of what it shows, each with its place.
 
     Args:
-        path: the mesh file; its ending is one of :data:`~naisr_model.exports.FORMATS`.
-        result: the surface, in millimetres.
+        path: the mesh file; its ending is one of :data:`~naisr_model.exports.FORMATS`, or of
+            :data:`~naisr_model.exports.CURVE_FORMATS` where the atlas is one of curves.
+        result: the surface or curve, in millimetres or the unit of the atlas.
         atlas: where it came from.
         patient: whose it is; None for the population average.
         reference: the patient that a change is counted from.
@@ -56,8 +62,29 @@ def surface_files(
 
 def surface_bytes(path: Path, result: SurfaceResult, atlas: AtlasCard) -> bytes:
     """A surface alone; otherwise as :func:`surface_files`."""
-    ending = _writable(path, result)
-    return mesh_bytes(_triangles(result, _at_vertices(result, atlas)), ending)
+    if len(result.points_mm) == 0:
+        raise InputError(f"{title_of(result.request.panel)} has no surface at these values; nothing to write")
+    if atlas.is_flat:
+        return _curve_bytes(path, result, atlas)
+    return mesh_bytes(_triangles(result, _at_vertices(result, atlas)), _writable(path, result))
+
+
+def _curve_bytes(path: Path, result: SurfaceResult, atlas: AtlasCard) -> bytes:
+    """A curve as the drawing or the text that the ending of its file asks for; numbers are in the text."""
+    from naisr_model.shapes.written import csv_bytes, svg_bytes
+
+    ending, curve = require_format(path, dim=2), _curve(result)
+    return (
+        csv_bytes(curve, _at_vertices(result, atlas))
+        if ending == "csv"
+        else svg_bytes(curve, atlas.frame.unit)
+    )
+
+
+def _curve(result: SurfaceResult) -> Curve:
+    from naisr_model.shapes.curve import Curve  # here, because it would slow down the start
+
+    return Curve(result.points_mm.astype(np.float64), result.faces)
 
 
 def _writable(path: Path, result: SurfaceResult) -> MeshFormat:
@@ -66,8 +93,6 @@ def _writable(path: Path, result: SurfaceResult) -> MeshFormat:
     Raises:
         InputError: when it cannot.
     """
-    if len(result.points_mm) == 0:
-        raise InputError(f"{title_of(result.request.panel)} has no surface at these values; nothing to write")
     ending = format_named(path)
     if ending is None:
         raise InputError(f"cannot write '{path.name}'; the ending must be one of {', '.join(FORMATS)}")
@@ -92,8 +117,10 @@ def description(
 ) -> dict[str, Any]:
     """What a mesh file shows, as plain JSON."""
     request = result.request
-    margin = None if _is_missed(patient) else result.volume_margin_cm3
-    given = dict(request.values)
+    margin = None if _is_missed(patient) else result.extent_margin
+    given, extent = dict(request.values), atlas.frame.extent
+    is_glb = format_named(Path(file_name)) == "glb"
+    shape, parts = (_curve, "segments") if atlas.is_flat else (_triangles, "triangles")
     is_scan = result.origin is Origin.MEASURED
     return {
         "file": file_name,
@@ -102,29 +129,29 @@ def description(
         "view": title_of(request.panel),
         "covariates": _covariate_records(atlas, given),
         "depends_on": sorted(given),
-        "length_unit": "m" if format_named(Path(file_name)) == "glb" else "mm",
-        "up": "y" if format_named(Path(file_name)) == "glb" else "z",
-        "volume_cm3": None if is_scan and not result.volume_cm3 else round(result.volume_cm3, 4),
-        "volume_cm3_is": OF_SCAN if is_scan else OF_SURFACE,
-        "volume_of_triangles_cm3": round(_triangles(result).volume / 1000, 4) if len(result.faces) else None,
-        "volume_95_percent_margin_cm3": None if margin is None else round(margin, 4),
-        "numbers": _numbers_record(result, atlas, format_named(Path(file_name))),
+        "length_unit": "m" if is_glb else atlas.frame.unit,
+        "up": "y" if is_glb or atlas.is_flat else "z",
+        extent.key(): None if is_scan and not result.extent else round(result.extent, 4),
+        f"{extent.key()}_is": OF_SCAN if is_scan else OF_SURFACE,
+        extent.key("of", parts): round(extent.of(shape(result)), 4) if len(result.faces) else None,
+        extent.key("95_percent_margin"): None if margin is None else round(margin, 4),
+        "numbers": _numbers_record(result, atlas, Path(file_name)),
         "patient": None if patient is None else patient_record(patient),
         "before": _before_record(request, atlas, reference),
         "vertices": len(result.points_mm),
-        "triangles": len(result.faces),
+        parts: len(result.faces),
         "lattice_resolution": request.resolution,
         "program": f"naisr-viewer {__version__}",
     }
 
 
-OF_SURFACE = "of the smooth surface through the vertices, as in the window"
+OF_SURFACE = "of the smooth shape through the vertices, as in the window"
 OF_SCAN = "of the scan as it was read; the file holds it as it is shown, in the frame of the atlas"
 
 
 def _numbers(request: SurfaceRequest, atlas: AtlasCard) -> Numbers:
     """What the numbers on a surface are: those of the map that was asked for, else of the kind of view."""
-    return kind_of(request.panel).numbers if request.map is None else numbers_of(atlas, request.map)
+    return kind_of(request.panel).numbers(atlas) if request.map is None else numbers_of(atlas, request.map)
 
 
 def _at_vertices(result: SurfaceResult, atlas: AtlasCard) -> dict[str, NDArray[np.float32]]:
@@ -133,13 +160,13 @@ def _at_vertices(result: SurfaceResult, atlas: AtlasCard) -> dict[str, NDArray[n
     return {} if coloured is None else {_numbers(result.request, atlas).name: coloured.values}
 
 
-def _numbers_record(
-    result: SurfaceResult, atlas: AtlasCard, ending: MeshFormat | None
-) -> dict[str, Any] | None:
+def _numbers_record(result: SurfaceResult, atlas: AtlasCard, file: Path) -> dict[str, Any] | None:
     """What the numbers at the vertices are, and whether the file holds them."""
     if result.colouring is None:
         return None
-    return _numbers(result.request, atlas)._asdict() | {"in_file": ending in POINT_FORMATS}
+    return _numbers(result.request, atlas)._asdict() | {
+        "in_file": file.suffix.lower()[1:] in NUMBERED_FORMATS
+    }
 
 
 def _before_record(

@@ -18,11 +18,12 @@ from naisr_viewer.state.overlay import Map
 from naisr_viewer.state.patients import Named
 from naisr_viewer.state.requests import Scale, SurfaceRequest, SurfaceResult
 from naisr_viewer.words.captions import DOUBTFUL, NO_SURFACE, NOT_VALID, UNSEEN, Caption, large
+from naisr_viewer.words.numbers import MILLIMETRES, in_unit
 
 Ask = Callable[[ExplorerState, Panel, int], SurfaceRequest]
 """What a panel shows in a state, at so many cells along a side of the box; there is an atlas."""
 
-Measured = Callable[[SurfaceResult], Caption]
+Measured = Callable[[AtlasCard, SurfaceResult], Caption]
 """What is told of a surface that is there and can be trusted."""
 
 
@@ -59,7 +60,7 @@ class PanelKind:
         colour: of a surface whose vertices have none of their own, ``#rrggbb``; that of the panel's
             covariate when left out.
         scale: of the numbers on its surface; None where it has none.
-        unit: of those numbers.
+        unit: of those numbers; millimetres stand for the atlas's unit of length.
         quantity: what they are, in a file; the name of the kind when left out.
         covariates: whose panels there are, one for each name; one of no covariate when left out.
         cells: of the matrix, for each of which there is one.
@@ -78,7 +79,7 @@ class PanelKind:
     caption: Callable[[ExplorerState, SurfaceResult], Caption]
     colour: str = ""
     scale: Scale | None = None
-    unit: str = "mm"
+    unit: str = MILLIMETRES
     quantity: str = ""
     covariates: Callable[[AtlasCard], tuple[str, ...]] = lambda _: ("",)
     cells: tuple[Cell | None, ...] = (None,)
@@ -88,10 +89,10 @@ class PanelKind:
     is_mapped: bool = False
     is_modelled: bool = True
 
-    @property
-    def numbers(self) -> Numbers:
+    def numbers(self, atlas: AtlasCard) -> Numbers:
         """What those on its surface are by themselves."""
-        return numbers(self.quantity or self.name, self.unit, self.hint)
+        unit = atlas.frame.unit
+        return numbers(self.quantity or self.name, in_unit(self.unit, unit), in_unit(self.hint, unit))
 
     def panels(self, atlas: AtlasCard) -> tuple[Panel, ...]:
         """All of this kind that an atlas can show."""
@@ -137,9 +138,9 @@ def caption_of(
         if result.request.person and not state.can_forecast:
             return Caption(large(NOT_VALID.text), NOT_VALID.hint)
         if result.doubtful:
-            return doubtful.beneath(measured(result))
+            return doubtful.beneath(measured(state.atlas, result))
         if state.atlas.population.has_data_at(dict(result.request.values)):
-            return measured(result)
-        return UNSEEN.beneath(measured(result))
+            return measured(state.atlas, result)
+        return UNSEEN.beneath(measured(state.atlas, result))
 
     return caption

@@ -2,6 +2,7 @@
 
 from naisr_viewer.panels import shape
 from naisr_viewer.panels.base import PanelKind, asked, caption_of
+from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Layout, Panel
 from naisr_viewer.state.requests import SurfaceRequest, SurfaceResult
@@ -23,10 +24,10 @@ def _ask(state: ExplorerState, panel: Panel, resolution: int) -> SurfaceRequest:
     return asked(state, panel, resolution, state.named, state.person, state.reference)
 
 
-def _gain(result: SurfaceResult) -> Caption:
-    if result.volume_before_cm3 is None or result.colouring is None:
+def _gain(atlas: AtlasCard, result: SurfaceResult) -> Caption:
+    if result.extent_before is None or result.colouring is None:
         return Caption(large("…"), HINT)
-    text = gained(result.volume_cm3, result.volume_before_cm3, result.volume_margin_cm3)
+    text = gained(result.extent, result.extent_before, result.extent_margin, atlas.frame.extent)
     share = beyond(result.colouring).removeprefix(" · ")
     return Caption(large(text) + (f"<br>{share}" if share else ""), HINT)
 

@@ -35,7 +35,7 @@ def curve_request(state: ExplorerState) -> CurveRequest | None:
 
 def can_judge(atlas: AtlasCard) -> bool:
     """Whether it can be known what is usual among the people of an atlas."""
-    return atlas.capabilities.trackable and atlas.population.tells_what_is_usual
+    return atlas.is_tabulated and atlas.population.tells_what_is_usual
 
 
 def wants_norms(state: ExplorerState) -> bool:

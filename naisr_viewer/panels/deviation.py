@@ -2,9 +2,11 @@
 
 from naisr_viewer.panels import shape
 from naisr_viewer.panels.base import PanelKind, ask_full_shape, caption_of
+from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.layouts import Layout
 from naisr_viewer.state.requests import SurfaceResult
 from naisr_viewer.words.captions import LATER, Caption, beyond, large
+from naisr_viewer.words.numbers import MILLIMETRES
 
 HINT = (
     "Distance of the patient's surface to that of the population's average at the same covariates, in mm: "
@@ -12,12 +14,14 @@ HINT = (
 )
 
 
-def _extremes(result: SurfaceResult) -> Caption:
+def _extremes(atlas: AtlasCard, result: SurfaceResult) -> Caption:
     hint = HINT + (LATER if result.request.values else "")
     if result.colouring is None:
         return Caption(large("…"), hint)
     inside, outside = result.colouring.values.min(), result.colouring.values.max()
-    ends = f"{inside:+.1f} to {outside:+.1f} mm".replace("-", "−")
+    unit = atlas.frame.unit
+    decimals = 1 if unit == MILLIMETRES else 3
+    ends = f"{inside:+.{decimals}f} to {outside:+.{decimals}f} {unit}".replace("-", "−")
     return Caption(large(ends) + f"<br>from the average{beyond(result.colouring)}", hint)
 
 

@@ -24,6 +24,7 @@ from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import FULL_SHAPE, Layout, Panel
 from naisr_viewer.state.requests import SurfaceRequest, SurfaceResult
 from naisr_viewer.words.captions import Caption
+from naisr_viewer.words.numbers import in_unit
 from naisr_viewer.words.titles import label
 
 KINDS: dict[str, PanelKind] = {
@@ -56,9 +57,21 @@ def title_of(panel: Panel) -> str:
     return kind_of(panel).title.format(covariate=label(panel.covariate))
 
 
+def hint_of(panel: Panel, atlas: AtlasCard) -> str:
+    """What a sub-plot is, for who hovers over its title."""
+    return in_unit(kind_of(panel).hint, atlas.frame.unit)
+
+
+def unit_of(panel: Panel, atlas: AtlasCard) -> str:
+    """Of the numbers on its surface."""
+    return in_unit(kind_of(panel).unit, atlas.frame.unit)
+
+
 def caption_of(state: ExplorerState, result: SurfaceResult) -> Caption:
     """What stands beneath a result."""
-    return kind_of(result.request.panel).caption(state, result)
+    assert state.atlas is not None
+    told = kind_of(result.request.panel).caption(state, result)
+    return Caption(told.text, in_unit(told.hint, state.atlas.frame.unit))
 
 
 def all_panels(atlas: AtlasCard) -> tuple[Panel, ...]:

@@ -7,7 +7,8 @@ from naisr_viewer.panels.base import Numbers, numbers
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.overlay import Map, Quantity
-from naisr_viewer.words.maps import HINTS, MILLIMETRES, rate_unit, told
+from naisr_viewer.words.maps import HINTS, rate_unit, told
+from naisr_viewer.words.numbers import in_unit
 
 
 def can_map(atlas: AtlasCard) -> bool:
@@ -39,12 +40,12 @@ def map_of(state: ExplorerState, covariate: str = "") -> Map | None:
 
 def numbers_of(atlas: AtlasCard, shown: Map) -> Numbers:
     """What the numbers of a map are: ``displacement_mm``, ``rate_of_age_mm_per_month``."""
-    meaning = HINTS[shown.quantity]
+    meaning = in_unit(HINTS[shown.quantity], atlas.frame.unit)
     if shown.quantity is Quantity.DISPLACEMENT:
-        return numbers("displacement", MILLIMETRES, meaning)
+        return numbers("displacement", atlas.frame.unit, meaning)
     covariate = covariate_of(atlas, shown)
     kind = "contrast" if covariate.kind == "binary" else "rate"
-    return numbers(f"{kind}_of_{covariate.name}", rate_unit(covariate), meaning)
+    return numbers(f"{kind}_of_{covariate.name}", rate_unit(covariate, atlas.frame.unit), meaning)
 
 
 def covariate_of(atlas: AtlasCard, shown: Map) -> Covariate:
@@ -57,4 +58,4 @@ def words_of_maps(state: ExplorerState) -> str:
     shown = map_of(state)
     if shown is None or state.atlas is None or not shown.covariate:
         return ""
-    return told(covariate_of(state.atlas, shown))
+    return told(covariate_of(state.atlas, shown), state.atlas.frame.unit)

@@ -33,8 +33,9 @@ def _ask(state: ExplorerState, panel: Panel, resolution: int) -> SurfaceRequest:
 TEMPLATE = Caption("template", "The shape from which all others are made; both axes begin with it.")
 
 
-def _volume(result: SurfaceResult) -> Caption:
-    told = Caption(volume(result.volume_cm3, result.volume_margin_cm3), enclosed(result).hint)
+def _volume(atlas: AtlasCard, result: SurfaceResult) -> Caption:
+    text = volume(result.extent, result.extent_margin, atlas.frame.extent)
+    told = Caption(text, enclosed(atlas, result).hint)
     return told if result.request.values else TEMPLATE.beneath(told)
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from naisr_viewer.panels.kinds import kind_of, request_for
+from naisr_viewer.panels.kinds import kind_of, request_for, unit_of
 from naisr_viewer.panels.maps import numbers_of
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Panel
@@ -41,7 +41,7 @@ def scale_of(state: ExplorerState, panel: Panel) -> PanelScale | None:
     shown = request_for(state, panel, 0).map if kind.is_mapped else None
     if kind.scale is None and shown is None:
         return None
-    unit = kind.unit if shown is None else numbers_of(atlas, shown).unit
+    unit = unit_of(panel, atlas) if shown is None else numbers_of(atlas, shown).unit
     own = f"{panel.kind} {panel.covariate}".strip()
     key = own if shown is None or not state.overlay.is_shared else unit
     return PanelScale(kind.scale or "signed", unit, key, dict(state.overlay.limits).get(key))

@@ -23,8 +23,9 @@ UNEXPRESSED = (
 
 
 def _caption(state: ExplorerState, result: SurfaceResult) -> Caption:
+    assert state.atlas is not None
     scan = state.shown.scan if state.shown else None
-    text = large(size_of(scan) if scan else "…") + _away(state, result)
+    text = large(size_of(scan, state.atlas) if scan else "…") + _away(state, result)
     share = result.unexpressed
     if share is None or share < WORTH_TELLING:
         return Caption(text, HINT)
@@ -33,12 +34,13 @@ def _caption(state: ExplorerState, result: SurfaceResult) -> Caption:
 
 def _away(state: ExplorerState, result: SurfaceResult) -> str:
     """The residual of the fit; at other covariates, where it no longer counts, the mean of the colours."""
-    if result.colouring is None:
+    if result.colouring is None or state.atlas is None:
         return ""
+    unit = state.atlas.frame.unit
     if state.fit is not None and result.request.values == state.fit.values:
-        told = f"residual {length(state.fit.residual_mm)}"
+        told = f"residual {length(state.fit.residual_mm, unit)}"
     else:
-        told = f"{length(float(np.abs(result.colouring.values).mean()))} from this shape on average"
+        told = f"{length(float(np.abs(result.colouring.values).mean()), unit)} from this shape on average"
     return f"<br>{told}{beyond(result.colouring)}"
 
 

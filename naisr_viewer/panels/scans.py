@@ -28,13 +28,15 @@ def _ask(state: ExplorerState, panel: Panel, resolution: int) -> SurfaceRequest:
     return asked(state, panel, resolution, (), state.person, before)
 
 
-def _caption(_state: ExplorerState, result: SurfaceResult) -> Caption:
-    before, now = result.volume_before_cm3, result.volume_cm3
-    text = gained(now, before, None) if before and now else "…"
+def _caption(state: ExplorerState, result: SurfaceResult) -> Caption:
+    assert state.atlas is not None
+    frame = state.atlas.frame
+    before, now = result.extent_before, result.extent
+    text = gained(now, before, None, frame.extent) if before and now else "…"
     if result.colouring is None:
         return Caption(large(text), HINT)
     low, high = result.colouring.values.min(), result.colouring.values.max()
-    ends = f"{way(float(low))} to {way(float(high))}"
+    ends = f"{way(float(low), frame.unit)} to {way(float(high), frame.unit)}"
     return Caption(
         large(text if before and now else "open scans") + f"<br>{ends}{beyond(result.colouring)}", HINT
     )

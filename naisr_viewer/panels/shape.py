@@ -2,6 +2,7 @@
 
 from naisr_viewer.panels.base import PanelKind, asked, caption_of
 from naisr_viewer.panels.maps import map_of
+from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import FULL_SHAPE, Layout, Panel
 from naisr_viewer.state.requests import SurfaceRequest, SurfaceResult
@@ -12,11 +13,13 @@ from naisr_viewer.words.numbers import volume
 COLOUR = "#6f9fe8"
 
 
-def enclosed(result: SurfaceResult) -> Caption:
-    """The volume of a surface, with the margin of a person's."""
+def enclosed(atlas: AtlasCard, result: SurfaceResult) -> Caption:
+    """The volume of a surface or the area of a curve, with the margin of a person's."""
     later = LATER if result.request.values else ""
-    within = "" if result.volume_margin_cm3 is None else f", ± half of its 95 % interval.{later}"
-    return Caption(large(volume(result.volume_cm3, result.volume_margin_cm3)), f"Enclosed volume{within}")
+    within = "" if result.extent_margin is None else f", ± half of its 95 % interval.{later}"
+    extent = atlas.frame.extent
+    told = volume(result.extent, result.extent_margin, extent)
+    return Caption(large(told), f"Enclosed {extent.title}{within}")
 
 
 _MEASURED = caption_of(enclosed)

@@ -2,6 +2,7 @@
 
 from naisr_viewer.panels import shape
 from naisr_viewer.panels.base import PanelKind, ask_full_shape, caption_of
+from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.layouts import Layout
 from naisr_viewer.state.requests import SurfaceResult
 from naisr_viewer.words.captions import Caption, beyond, large
@@ -13,12 +14,12 @@ HINT = (
 )
 
 
-def _mean_margin(result: SurfaceResult) -> Caption:
+def _mean_margin(atlas: AtlasCard, result: SurfaceResult) -> Caption:
     if result.colouring is None:
         return Caption(large("…"), HINT)
     mean_mm = result.colouring.values.mean()
     told = f"<br>mean 95 % margin{beyond(result.colouring)}"
-    return Caption(large(f"± {length(float(mean_mm))}") + told, HINT)
+    return Caption(large(f"± {length(float(mean_mm), atlas.frame.unit)}") + told, HINT)
 
 
 KIND = PanelKind(

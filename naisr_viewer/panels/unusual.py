@@ -7,6 +7,7 @@ import numpy as np
 from naisr_viewer.panels import shape
 from naisr_viewer.panels.base import PanelKind, ask_full_shape, caption_of
 from naisr_viewer.panels.curves import can_judge
+from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Layout, Panel
 from naisr_viewer.state.requests import SurfaceRequest, SurfaceResult
@@ -24,7 +25,7 @@ def _ask(state: ExplorerState, panel: Panel, resolution: int) -> SurfaceRequest:
     return replace(ask_full_shape(state, panel, resolution), is_judged=state.has_norms)
 
 
-def _share(result: SurfaceResult) -> Caption:
+def _share(_atlas: AtlasCard, result: SurfaceResult) -> Caption:
     if result.colouring is None:
         return Caption(large("…"), HINT if result.request.is_judged else COMING)
     share = 100 * float(np.mean(result.colouring.values != 0))

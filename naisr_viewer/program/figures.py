@@ -30,6 +30,7 @@ from naisr_viewer.views.main_window import MainWindow
 
 PIXELS = (1280, 800)
 SHOWN = {"age": 60.0, "weight": 19.0, "sex": -1.0}
+MAN: Named = (("arms", 0.6), ("legs", -0.6))
 HARDLY_ANYONE: Named = (("age", 70.0), ("weight", 48.0))
 WIDENED_MM, RING_MM = 2.0, 4.0
 OTHER_SEED, AGE_MONTHS, LATER_MONTHS = 1000, 90.0, 36.0
@@ -76,6 +77,9 @@ def main(folder: Path) -> None:
         controller.set_layout(Layout.CHANGE)
         controller.settle("age", dict(controller.state.named)["age"] + LATER_MONTHS)
         take_screenshot(window, controller, folder / "patient.png")
+        controller.begin(with_values(opened(ExplorerState(), engine.open(shipped_atlas("starman"))), MAN))
+        controller.set_quantity(Quantity.DISPLACEMENT)
+        take_screenshot(window, controller, pictures / "plane.png")
 
 
 def _pin_three_places(window: MainWindow, controller: Controller) -> None:

@@ -125,7 +125,8 @@ def _export_moved(window: MainWindow, controller: Controller, folder: Path) -> P
     for row in rows[:1]:
         drag(row, 0.5, 0.75)
     _picture(window, controller, folder / "full-shape.png")
-    choice = ExportChoice(panels_in(Layout.SIDE_BY_SIDE, atlas), "stl", EXACT_RESOLUTION, folder)
+    ending = "csv" if atlas.is_flat else "stl"
+    choice = ExportChoice(panels_in(Layout.SIDE_BY_SIDE, atlas), ending, EXACT_RESOLUTION, folder)
     plan = planned(controller.state, choice)
     controller.export(choice, replaces=True)
     finish(window, controller)

@@ -246,7 +246,7 @@ def unattended(
     from naisr_viewer.program import headless
 
     if first.reading is not None:
-        Clinic.require_label(first.reading)
+        Clinic.require_label(first.reading, first.card)
     ensure_display(pixels)
     with own_window(engine) as (window, controller):
         window.resize(*pixels)

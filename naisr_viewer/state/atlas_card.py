@@ -9,6 +9,7 @@ from pathlib import Path
 from naisr_model.capabilities import Capabilities
 from naisr_model.covariates import Covariate, Population, complete, read_values
 from naisr_model.files import Stamp
+from naisr_model.frames import Frame
 
 RealVector = tuple[float, ...]
 """Real covariate values in the atlas's covariate order."""
@@ -24,6 +25,7 @@ class AtlasCard:
         covariates: the sliders, in order; none where the shape model depends on none.
         population: real values of the subjects behind the atlas, for the histograms.
         capabilities: what its shape model can do; what it cannot do is absent from the window.
+        frame: where its shapes are, in which unit of length, and whether in space or in the plane.
         written: of the file, when it was read.
     """
 
@@ -32,7 +34,18 @@ class AtlasCard:
     covariates: tuple[Covariate, ...]
     population: Population
     capabilities: Capabilities
+    frame: Frame
     written: Stamp = None
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether its shapes are curves in the plane, which are looked at from the front alone."""
+        return self.frame.dim == 2
+
+    @property
+    def is_tabulated(self) -> bool:
+        """Whether previews are carried by tables; curves are found by the networks in no time."""
+        return self.capabilities.trackable and not self.is_flat
 
     @property
     def start(self) -> RealVector:

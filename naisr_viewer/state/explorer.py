@@ -144,7 +144,7 @@ def opened(state: ExplorerState, atlas: AtlasCard) -> ExplorerState:
         layout,
         follow=state.follow,
         has_ghost=state.has_ghost,
-        has_edges=state.has_edges,
+        has_edges=state.has_edges and not atlas.is_flat,
         matrix=first_matrix(atlas),
         drawer=drawer,
         support=suited(state.support, atlas),

@@ -23,7 +23,8 @@ class Reading:
     """How a patient's file is read and placed.
 
     Attributes:
-        path: a mesh, whole or in part, a label volume or a cloud of points.
+        path: a mesh, whole or in part, a label volume or a cloud of points; in the plane a drawing, points or
+            a label image.
         label: which label of a volume, its number or its name; None where there is only one.
         scale: millimetres per unit of the file; None to guess where the size is implausible.
         align: how it is moved to the atlas.
@@ -55,23 +56,24 @@ class Scan:
     """A patient's measured shape in the frame of the atlas.
 
     Attributes:
-        points_mm: vertices for display, float32 ``[n, 3]``.
-        normals: unit normals there, float32 ``[n, 3]``; 0 for a cloud of points.
-        faces: vertex numbers of the triangles, int64 ``[m, 3]``; none for a cloud of points.
+        points_mm: vertices for display, float32 ``[n, dim]``.
+        normals: unit normals there, float32 ``[n, dim]``; 0 for a cloud of points.
+        faces: vertex numbers of the triangles or segments, int64 ``[m, dim]``; none for a cloud of points.
         source: what was read, for example ``p01.stl, 12,034 faces``.
-        volume_cm3: enclosed volume; None where the surface is open.
+        extent: what it encloses, a volume or an area; None where it is open.
         alignment: how it was moved to the atlas, a sentence; empty where it was not.
         notes: what is odd and has to be looked at, a sentence each.
         repairs: what was set right or does no harm, a sentence each.
         blocked: what forbids a fit and what to do about it, a sentence; empty where nothing does.
-        is_astray: whether it lies elsewhere than the shapes of the atlas do, so that it is aligned first.
+        is_astray: whether it lies elsewhere than the shapes of the atlas do, so that it is aligned first;
+            curves are not.
     """
 
     points_mm: NDArray[np.float32]
     normals: NDArray[np.float32]
     faces: NDArray[np.int64]
     source: str
-    volume_cm3: float | None = None
+    extent: float | None = None
     alignment: str = ""
     notes: tuple[str, ...] = ()
     repairs: tuple[str, ...] = ()
@@ -87,8 +89,8 @@ class Fitted:
         person: names the code in requests; every fit has another one, and 0 is the population average.
         values: real values of all covariates.
         intervals: name, low and high end (95 %) of each inferred covariate.
-        volume_cm3: of the fitted shape.
-        volume_margin_cm3: half of its 95 % interval; None where the shape is the template.
+        extent: what the fitted shape encloses.
+        extent_margin: half of its 95 % interval; None where the shape is the template.
         residual_mm: mean distance of the scan to the fitted surface.
         lasting: share of what sets the person apart that is kept at other covariates; None where the shape
             model knows nobody at others.
@@ -102,8 +104,8 @@ class Fitted:
     person: int
     values: Named
     intervals: tuple[tuple[str, float, float], ...]
-    volume_cm3: float
-    volume_margin_cm3: float | None
+    extent: float
+    extent_margin: float | None
     residual_mm: float
     lasting: float | None
     seconds: float

@@ -12,7 +12,7 @@ MOST_PINS = 3
 """How many there can be; one more takes the place of the oldest."""
 
 Point = tuple[float, float, float]
-"""Millimetres in the frame of the atlas."""
+"""Millimetres in the frame of the atlas; in the plane z is 0."""
 
 
 @dataclass(frozen=True)

@@ -75,21 +75,22 @@ class Colouring:
 
 @dataclass(frozen=True, eq=False)
 class SurfaceResult:
-    """A surface ready to be drawn.
+    """A surface, or a curve in the plane, ready to be drawn.
 
     Attributes:
         request: the question this answers.
-        points_mm: vertices in millimetres, float32 ``[n, 3]``.
-        normals: outward unit normals at the vertices, float32 ``[n, 3]``.
-        faces: vertex numbers of the triangles, int64 ``[m, 3]``; none where no surface exists.
-        volume_cm3: enclosed volume.
+        points_mm: vertices in millimetres or the unit of the atlas's frame, float32 ``[n, dim]``.
+        normals: outward unit normals at the vertices, float32 ``[n, dim]``.
+        faces: vertex numbers of the triangles, or of the segments of a curve, int64 ``[m, dim]``; none where
+            there is no surface.
+        extent: what it encloses, a volume or an area, in the unit of the atlas's extent.
         seconds: how long it took to compute; equal surfaces share one computation and its arrays.
         origin: how it was found.
         doubtful: the deformation folds, so that a preview may lack or invent pieces.
         preview_error_mm: of an exact surface: the distance within which 99 % of the preview's vertices
             lay; None where there was no preview by tabulated displacements.
-        volume_margin_cm3: half of the volume's 95 % interval; None for the population average.
-        volume_before_cm3: of a change: the volume that it is counted from.
+        extent_margin: half of its 95 % interval; None for the population average.
+        extent_before: of a change: the extent that it is counted from.
         unexpressed: of a scan: share of it that the atlas cannot express; None where that is not asked.
         colouring: of a kind of view with numbers on its surface, at rest; else None.
     """
@@ -98,15 +99,20 @@ class SurfaceResult:
     points_mm: NDArray[np.float32]
     normals: NDArray[np.float32]
     faces: NDArray[np.int64]
-    volume_cm3: float
+    extent: float
     seconds: float
     origin: Origin
     doubtful: bool = False
     preview_error_mm: float | None = None
-    volume_margin_cm3: float | None = None
-    volume_before_cm3: float | None = None
+    extent_margin: float | None = None
+    extent_before: float | None = None
     unexpressed: float | None = None
     colouring: Colouring | None = None
+
+    @property
+    def dim(self) -> int:
+        """3 for a surface, 2 for a curve."""
+        return self.points_mm.shape[1]
 
     @property
     def is_exact(self) -> bool:
@@ -120,7 +126,7 @@ class ExportChoice:
 
     Attributes:
         panels: the surfaces.
-        format: one of :data:`~naisr_model.exports.FORMATS`.
+        format: of surfaces one of :data:`~naisr_model.exports.FORMATS`, of curves of its sister.
         resolution: cells along a side of the box.
         folder: made when it is missing.
         figure: ``pdf`` or ``svg`` where the panels are the matrix, whose files have a folder of their own in

@@ -12,6 +12,7 @@ from PySide6.QtCore import QObject, Qt, SignalInstance
 from PySide6.QtGui import QAction, QActionGroup, QKeySequence
 from PySide6.QtWidgets import QMenu, QToolBar, QWidget
 
+from naisr_model.shipped import ATLASES
 from naisr_viewer.panels.kinds import layouts_of
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.drawer import Tab, tabs_of
@@ -75,6 +76,9 @@ class Window(Protocol):
 
     def ask_screenshot(self) -> None:
         """Let a place be chosen for a picture."""
+
+    def open_example(self, name: str) -> None:
+        """Open one of the atlases that come with the program."""
 
     def show_document(self, page: str) -> None:
         """Open one of the documents that come with the program."""
@@ -159,6 +163,11 @@ def _drawer(tab: Tab, keys: str, tip: str) -> Command:
     )
 
 
+def _is_in_space(atlas: AtlasCard) -> bool:
+    """Curves in the plane have one side, no triangles and nothing to cut."""
+    return not atlas.is_flat
+
+
 def _look(direction: str, number: int) -> Command:
     return Command(
         f"from {direction}",
@@ -166,6 +175,7 @@ def _look(direction: str, number: int) -> Command:
         lambda window: window.shapes.look_from(direction),
         keys=(f"Alt+{number}",),
         needs=OPEN,
+        offered=_is_in_space,
     )
 
 
@@ -182,6 +192,10 @@ def _document(title: str, page: str, *keys: str) -> Command:
     return Command(f"document {page}", title, lambda window: window.show_document(page), keys=keys)
 
 
+def _example(name: str, title: str) -> Command:
+    return Command(f"example {name}", title, lambda window: window.open_example(name), tip=f"Open {name}")
+
+
 LAYOUTS = tuple(_layout(layout, number) for number, layout in enumerate(Layout, start=1))
 DRAWER = (
     _drawer(Tab.POINT, "Ctrl+Shift+P", "What each covariate does to the places that are pinned"),
@@ -195,6 +209,7 @@ DOCUMENTS = (
     _document("Glossary", "glossary.md"),
     _document("Architecture", "architecture.md"),
 )
+EXAMPLES = tuple(_example(name, title) for name, title in ATLASES.items())
 THEMES = tuple(_theme(choice) for choice in ThemeChoice)
 
 COMMANDS = (
@@ -289,7 +304,7 @@ COMMANDS = (
         "Copy table",
         lambda window: window.table_copy_requested.emit(),
         keys=("Ctrl+Alt+C",),
-        tip="Copy covariates, volume and cut of every view on screen, for a spreadsheet",
+        tip="Copy covariates and volume or area of every view on screen, for a spreadsheet",
         needs=OPEN,
     ),
     Command(
@@ -337,6 +352,7 @@ COMMANDS = (
         tip="Cut all shapes by one plane; again to have them whole",
         needs=AT_REST,
         is_switch=True,
+        offered=_is_in_space,
     ),
     Command(
         "edges",
@@ -346,6 +362,7 @@ COMMANDS = (
         tip="Draw the triangles that the surfaces are made of",
         needs=OPEN,
         is_switch=True,
+        offered=_is_in_space,
     ),
     Command(
         "reset camera",
@@ -365,6 +382,7 @@ COMMANDS = (
         tip="All keys, and what the mouse does",
     ),
     *DOCUMENTS,
+    *EXAMPLES,
     Command(
         "about atlas",
         "About this atlas",
@@ -381,6 +399,9 @@ SEPARATOR = ""
 
 RECENT = "open recent"
 """The entry that opens a menu of files, which the window fills."""
+
+EXAMPLE = "open example"
+"""The entry that opens a menu of :data:`EXAMPLES`."""
 
 
 def _names(commands: Sequence[Command]) -> tuple[str, ...]:
@@ -400,7 +421,7 @@ MENUS = {
         *_names(LAYOUTS), "patients", *_names(DRAWER), SEPARATOR,
         "play", "section", "edges", SEPARATOR, "reset camera", *_names(LOOKS), SEPARATOR, *_names(THEMES),
     ),
-    "&Help": ("keys", *_names(DOCUMENTS), SEPARATOR, "about atlas", "about"),
+    "&Help": ("keys", *_names(DOCUMENTS), SEPARATOR, EXAMPLE, SEPARATOR, "about atlas", "about"),
 }  # fmt: skip
 """What stands in the menu bar, by name."""
 

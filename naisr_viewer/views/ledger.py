@@ -14,6 +14,7 @@ from naisr_viewer.views.colours import covariate_colour, pin_colour
 from naisr_viewer.views.elided import shortened
 from naisr_viewer.views.theme import LIGHT, Theme
 from naisr_viewer.words import ledger as words
+from naisr_viewer.words.numbers import MILLIMETRES
 from naisr_viewer.words.titles import as_tip
 
 TITLE_PX, LINE_PX = 24, 20
@@ -39,10 +40,12 @@ class Ink:
     Attributes:
         theme: of the window.
         causes: colour of each covariate, by name.
+        unit: of length.
     """
 
     theme: Theme = LIGHT
     causes: tuple[tuple[str, str], ...] = ()
+    unit: str = MILLIMETRES
 
     def of(self, part: Part) -> QColor:
         """The colour of a part; grey of what no covariate did."""
@@ -81,7 +84,7 @@ class EntryChart(QWidget):
             ink: what it is painted with.
         """
         self._entry, self._scale_mm, self._ink = entry, scale_mm, ink
-        text = words.NO_PLACE if entry is None else words.told(entry)
+        text = words.NO_PLACE if entry is None else words.told(entry, ink.unit)
         self.setToolTip(as_tip(f"{text}\n\n{words.HINT}"))
         self.setAccessibleName(text)
         self.updateGeometry()
@@ -95,7 +98,7 @@ class EntryChart(QWidget):
     def sizeHint(self) -> QSize:
         """A line for each cause."""
         count = 1 if self._entry is None else len(words.lines(self._entry))
-        return QSize(NAME_PX + FIGURE_PX + 2 * LEAST_BAR_PX, TITLE_PX + count * LINE_PX)
+        return QSize(NAME_PX + self._figure_px + 2 * LEAST_BAR_PX, TITLE_PX + count * LINE_PX)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         """The title with the dot that marks the place on the shapes, and a line for each cause."""
@@ -116,22 +119,30 @@ class EntryChart(QWidget):
                 self._paint_line(painter, TITLE_PX + row * LINE_PX, name, part)
         painter.end()
 
+    @property
+    def _figure_px(self) -> int:
+        """Room for a figure with its unit."""
+        return max(FIGURE_PX, self.fontMetrics().horizontalAdvance(f"−0.0888 {self._ink.unit}") + 6)
+
     def _paint_line(self, painter: QPainter, top: float, name: str, part: Part) -> None:
-        along_px = ALONG_PX if self.width() >= NAME_PX + FIGURE_PX + ALONG_PX + 2 * LEAST_BAR_PX else 0
-        right = self.width() - FIGURE_PX - along_px
+        has_room = self.width() >= NAME_PX + self._figure_px + ALONG_PX + 2 * LEAST_BAR_PX
+        along_px = ALONG_PX if has_room else 0
+        figure_px = self._figure_px
+        right = self.width() - figure_px - along_px
         self._write(painter, QRectF(0, top, NAME_PX - 6, LINE_PX), name)
         self._paint_bar(painter, QRectF(NAME_PX, top, right - NAME_PX - 6, LINE_PX), part)
         end = Qt.AlignmentFlag.AlignRight
-        self._write(painter, QRectF(right, top, FIGURE_PX, LINE_PX), words.across(part), side=end)
+        figure = words.across(part, self._ink.unit)
+        self._write(painter, QRectF(right, top, figure_px, LINE_PX), figure, side=end)
         if along_px:
-            box = QRectF(right + FIGURE_PX, top, along_px, LINE_PX)
-            self._write(painter, box, words.along(part), muted=True, side=end)
+            box = QRectF(right + figure_px, top, along_px, LINE_PX)
+            self._write(painter, box, words.along(part, self._ink.unit), muted=True, side=end)
 
     def _paint_bar(self, painter: QPainter, box: QRectF, part: Part) -> None:
         middle, half = box.center().x(), box.width() / 2
 
         def place(mm: float) -> float:
-            return middle + half * max(-1.0, min(1.0, mm / self._scale_mm))
+            return middle + half * max(-1.0, min(1.0, mm / (self._scale_mm or 1.0)))
 
         bar = QRectF(middle, box.top() + 5, place(part.normal_mm) - middle, box.height() - 10)
         painter.fillRect(bar.normalized(), self._ink.of(part))
@@ -207,9 +218,9 @@ class LedgerPage(QScrollArea):
         if self._ledger is None or self._atlas is None:
             return
         atlas, entries = self._atlas, {entry.pin: entry for entry in self._ledger.entries}
-        ink = Ink(
-            self._theme, tuple((one.name, covariate_colour(atlas, one.name)) for one in atlas.covariates)
-        )
+        causes = tuple((one.name, covariate_colour(atlas, one.name)) for one in atlas.covariates)
+        ink = Ink(self._theme, causes, atlas.frame.unit)
+        least = LEAST_SCALE_MM if ink.unit == MILLIMETRES else 0.0
         ways = [abs(part.normal_mm) for entry in entries.values() for _, part in words.lines(entry)]
         for pin, chart in self.charts.items():
-            chart.show_entry(entries.get(pin), max([LEAST_SCALE_MM, *ways]), ink)
+            chart.show_entry(entries.get(pin), max([least, *ways]), ink)

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QGuiApplication, QImage, QPaintEvent
-from PySide6.QtWidgets import QApplication, QHBoxLayout, QMainWindow, QWidget
+from PySide6.QtWidgets import QApplication, QHBoxLayout, QMainWindow, QMenu, QWidget
 
-from naisr_model.shipped import shipped
+from naisr_model.errors import InputError
+from naisr_model.shipped import shipped, shipped_atlas
 from naisr_viewer.panels.kinds import title_of, visible_panels
 from naisr_viewer.panels.maps import can_map, words_of_maps
 from naisr_viewer.panels.matrix import here
@@ -27,6 +28,8 @@ from naisr_viewer.state.section import Section
 from naisr_viewer.state.theme import ThemeChoice
 from naisr_viewer.views.actions import (
     COMMANDS,
+    EXAMPLE,
+    EXAMPLES,
     MENUS,
     RECENT,
     enable,
@@ -67,6 +70,7 @@ from naisr_viewer.views.status_bar import StatusBar
 from naisr_viewer.views.style_sheet import style_sheet
 from naisr_viewer.views.theme import palette, resolved
 from naisr_viewer.words.matrix import heads
+from naisr_viewer.words.numbers import in_words
 from naisr_viewer.words.readout import number, readout
 
 if TYPE_CHECKING:
@@ -158,6 +162,8 @@ class MainWindow(QMainWindow):
             self.covariates.show_atlas(state.atlas, theme)
             self.shapes.show_atlas(state.atlas, theme)
             self.setWindowTitle(f"{state.atlas.name} — {TITLE}")
+            self.scale.show_unit(state.atlas.frame.unit)
+            self._centre.maps.show_unit(state.atlas.frame.unit)
             offer(COMMANDS, self._actions, state.atlas)
             self._centre.drawer.offer(tabs_of(state.atlas))
             in_order(self._stops)
@@ -321,6 +327,13 @@ class MainWindow(QMainWindow):
         self._keys.show()
         self._keys.raise_()
 
+    def open_example(self, name: str) -> None:
+        """Open one of the atlases that come with the program."""
+        try:
+            self.open_requested.emit(shipped_atlas(name))
+        except InputError as error:
+            self.show_error(in_words(error))
+
     def show_document(self, page: str) -> None:
         """Open one of the documents that come with the program, in the window that shows one already."""
         self._documents = self._documents or DocumentWindow(shipped("docs"), self)
@@ -361,7 +374,7 @@ class MainWindow(QMainWindow):
 
     def ask_scan(self) -> None:
         """Let a patient's file be chosen and opened."""
-        path = ask_scan_path(self)
+        path = ask_scan_path(self, self._state.atlas)
         if path is not None and is_atlas(path):
             if ask_instead(self, path, "atlas"):
                 self.open_requested.emit(path)
@@ -416,6 +429,7 @@ class MainWindow(QMainWindow):
     def grab_image(self) -> QImage:
         """The whole window as a picture, with all that it will have in a moment."""
         self._prepare_charts()
+        self.shapes.grab()  # only what is drawn tells the scale bar how long a millimetre is
         return self.grab().toImage()
 
     def closeEvent(self, event: QCloseEvent) -> None:
@@ -458,7 +472,10 @@ class MainWindow(QMainWindow):
         row.addWidget(self.patients)
         self.setCentralWidget(body)
         self.setStatusBar(self._below)
-        entries = {**self._actions, RECENT: self._recent.menuAction()}
+        examples = QMenu("Examples", self)
+        fill(examples, [command.name for command in EXAMPLES], self._actions)
+        menus = {RECENT: self._recent, EXAMPLE: examples}
+        entries = {**self._actions, **{name: menu.menuAction() for name, menu in menus.items()}}
         for title, names in MENUS.items():
             fill(self.menuBar().addMenu(title), names, entries)
         self.addToolBar(make_toolbar(self._actions, self))
@@ -500,11 +517,14 @@ class MainWindow(QMainWindow):
 
     def _show_readout(self, panel: Panel, hit: Hit) -> None:
         """What the mouse rests over."""
-        scale = scale_of(self._state, panel)
+        scale, atlas = scale_of(self._state, panel), self._state.atlas
+        assert atlas is not None
         told = ""
         if hit.value is not None and scale is not None:
             told = number(hit.value, scale.unit, scale.scale == "signed")
-        self._below.show_readout(readout(title_of(panel), hit.point_mm, told))
+        self._below.show_readout(
+            readout(title_of(panel), hit.point_mm[: atlas.frame.dim], told, atlas.frame.unit)
+        )
 
     def _prepare_charts(self) -> None:
         """Once, after the first picture."""

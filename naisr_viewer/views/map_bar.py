@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QToolButton, QWidget
 from naisr_viewer.state.overlay import Overlay, Quantity
 from naisr_viewer.views.elided import ElidedCheckBox, ElidedLabel
 from naisr_viewer.words.maps import HINTS, SHARED, SHARED_HINT, TITLES
+from naisr_viewer.words.numbers import in_unit
 from naisr_viewer.words.titles import as_tip
 
 LEAST_PX, SHARED_PX = 32, 110
@@ -60,6 +61,12 @@ class MapBar(QFrame):
             self.shared.setChecked(overlay.is_shared)
         self.shared.setVisible(overlay.quantity is not Quantity.PLAIN)
         self._told.setText(told)
+
+    def show_unit(self, unit: str) -> None:
+        """Name the choices after the atlas's unit of length."""
+        for quantity, button in self.buttons.items():
+            button.setText(in_unit(TITLES[quantity], unit))
+            button.setToolTip(as_tip(in_unit(HINTS[quantity], unit)))
 
     def _button(self, quantity: Quantity) -> QToolButton:
         button = QToolButton(self)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from naisr_model.covariates import Covariate
 from naisr_viewer.state.curves import Curves, MeasureCurve, Reckoning, Standing, readout
-from naisr_viewer.words.numbers import reading
+from naisr_viewer.words.numbers import places, reading
 from naisr_viewer.words.titles import label
 
+METRIC = ("mm", "mm²", "cm²", "cm³")
 LAST_MOVED = "moved last"
 HINT = (
     "Line: the population's shape, the other covariates as they are\n"
@@ -22,8 +23,8 @@ NOT_KNOWN = "95 % of people: not worked out"
 
 
 def figure(value: float, unit: str) -> str:
-    """A measure with digits that mean something: ``46.2 cm³``, ``69,100 cm³``."""
-    return f"{value:,.{0 if abs(value) >= 1000 else 1}f} {unit}".rstrip()
+    """A measure with digits that mean something: ``46.2 cm³``, ``69,100 cm³``, ``1.447 units²``."""
+    return f"{_number(value, unit)} {unit}".rstrip()
 
 
 def axis(curve: MeasureCurve) -> str:
@@ -41,9 +42,9 @@ def told(covariate: Covariate, curves: Curves, curve: MeasureCurve, place: float
     usual, sure, band, own = readout(curves, curve, place)
     lines = [f"{label(covariate.name)} {reading(covariate, place)}: {figure(usual, curve.unit)}"]
     if sure is not None:
-        lines.append(f"95 % sure: {_ends(*sure)}")
+        lines.append(f"95 % sure: {_ends(*sure, curve.unit)}")
     if band is not None:
-        lines.append(f"95 % of people: {_ends(*band)}")
+        lines.append(f"95 % of people: {_ends(*band, curve.unit)}")
     if own is not None:
         lines.append(f"This patient: {figure(own, curve.unit)}")
     return "\n".join(lines)
@@ -64,17 +65,25 @@ def rank(standing: Standing) -> str:
 
 def standing_hint(standing: Standing) -> str:
     """What a measure of a patient is compared with, for who hovers over it."""
+    usual = _ends(standing.low, standing.high, standing.unit)
     return (
         f"{standing.title} in {standing.unit}: {standing.definition}.\n"
-        f"95 % of people of the same covariates have {_ends(standing.low, standing.high)} {standing.unit}. "
+        f"95 % of people of the same covariates have {usual} {standing.unit}. "
         "The percentile is the share of them that have less; z is how many standard deviations the patient "
         "lies above their median."
     )
 
 
-def _ends(low: float, high: float) -> str:
+def _ends(low: float, high: float, unit: str) -> str:
     """An interval without its unit."""
-    return " to ".join(figure(end, "") for end in (low, high))
+    return " to ".join(_number(end, unit) for end in (low, high))
+
+
+def _number(value: float, unit: str) -> str:
+    """Of a unit whose size nobody knows, four digits."""
+    if unit not in METRIC:
+        return f"{value:,.{places(value, 4)}f}"
+    return f"{value:,.{0 if abs(value) >= 1000 else 1}f}"
 
 
 def _percentile(share: float) -> str:

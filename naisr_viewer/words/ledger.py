@@ -15,7 +15,7 @@ HINT = (
 )
 INVITATION = (
     "Click on a shape to pin a place, up to three. It is marked in every shape, and here stands what each "
-    "covariate does to it, in millimetres. Esc removes the pins."
+    "covariate does to it. Esc removes the pins."
 )
 NO_PLACE = "The deformation folds at this place: it has no one place in the full shape."
 
@@ -32,21 +32,24 @@ def lines(entry: Entry) -> tuple[tuple[str, Part], ...]:
     return (*causes, *person, (SUM, entry.total))
 
 
-def across(part: Part) -> str:
+def across(part: Part, unit: str) -> str:
     """The way along the normal, with half of its 95 % interval where that is known."""
-    return way(part.normal_mm) if part.margin_mm is None else margin(part.normal_mm, part.margin_mm)
+    if part.margin_mm is None:
+        return way(part.normal_mm, unit)
+    return margin(part.normal_mm, part.margin_mm, unit)
 
 
-def along(part: Part) -> str:
+def along(part: Part, unit: str) -> str:
     """The rest of the way, which the shape's outline does not show."""
-    return f"{length(part.tangential_mm)} along it"
+    return f"{length(part.tangential_mm, unit)} along it"
 
 
-def told(entry: Entry) -> str:
+def told(entry: Entry, unit: str) -> str:
     """All of an entry, for who hovers over it or has it read aloud."""
-    rows = [f"{name}: {_line(part)}" for name, part in lines(entry)]
+    rows = [f"{name}: {_line(part, unit)}" for name, part in lines(entry)]
     return "\n".join([title(entry.pin.number), *rows])
 
 
-def _line(part: Part) -> str:
-    return f"{across(part)}{'' if part.is_told else ', not told from nothing'}, {along(part)}"
+def _line(part: Part, unit: str) -> str:
+    doubt = "" if part.is_told else ", not told from nothing"
+    return f"{across(part, unit)}{doubt}, {along(part, unit)}"

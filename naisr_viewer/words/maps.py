@@ -7,9 +7,8 @@ from collections.abc import Sequence
 
 from naisr_model.covariates import Covariate
 from naisr_viewer.state.overlay import Quantity
+from naisr_viewer.words.numbers import MILLIMETRES
 from naisr_viewer.words.titles import label
-
-MILLIMETRES = "mm"
 
 TITLES = {Quantity.PLAIN: "Plain", Quantity.DISPLACEMENT: "mm", Quantity.RATE: "mm per unit"}
 """What the choices are called."""
@@ -41,16 +40,16 @@ SHARED_HINT = (
 )
 
 
-def rate_unit(covariate: Covariate) -> str:
-    """Millimetres per unit of a covariate: ``mm per month``, ``mm, M against F``."""
+def rate_unit(covariate: Covariate, unit: str = MILLIMETRES) -> str:
+    """Lengths per unit of a covariate: ``mm per month``, ``mm, M against F``."""
     if covariate.kind == "binary":
-        return f"mm, {covariate.levels[1]} against {covariate.levels[0]}"
-    return f"mm per {_one(covariate.unit) or 'unit'}"
+        return f"{unit}, {covariate.levels[1]} against {covariate.levels[0]}"
+    return f"{unit} per {_one(covariate.unit) or 'unit'}"
 
 
-def told(covariate: Covariate | None) -> str:
+def told(covariate: Covariate | None, unit: str = MILLIMETRES) -> str:
     """What the numbers on the full shape are of; empty where they are of all covariates."""
-    return "" if covariate is None else f"Full shape: {label(covariate.name)}, {rate_unit(covariate)}"
+    return "" if covariate is None else f"Full shape: {label(covariate.name)}, {rate_unit(covariate, unit)}"
 
 
 def without(names: Sequence[str]) -> str:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 SHAPES = (
-    ("Drag", "turn the shapes"),
+    ("Drag", "turn the shapes; move curves in the plane"),
     ("Drag with Shift, or with the middle button", "move them"),
     ("Wheel", "nearer to what is under the pointer, or farther"),
     ("Double-click", "bring a point to the middle; in the matrix, show that cell large"),
     ("Click", "pin a place; in the matrix, take the values of that cell"),
     ("Rest on a surface", "tell the place and the number there"),
-    ("Arrows", "turn the shapes, once the Tab key has come to them"),
+    ("Arrows", "turn the shapes, or move curves, once the Tab key has come to them"),
     ("Shift+Arrows", "move them"),
     ("+ and −", "nearer, or farther"),
 )

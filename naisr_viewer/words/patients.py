@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-from naisr_model.covariates import Covariate
+from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.patients import Fitted, Method, Scan
 from naisr_viewer.words.numbers import capitalised, duration, given, interval_reading, length, reading, volume
 from naisr_viewer.words.titles import label
@@ -34,29 +32,38 @@ def units(scale: float | None) -> tuple[tuple[float | None, str], ...]:
     return UNITS if scale in dict(UNITS) else (*UNITS, (scale, f"{scale:g} mm"))
 
 
-def size_of(scan: Scan) -> str:
-    """The volume of a scan, or what it is where it encloses none."""
-    if scan.volume_cm3 is not None:
-        return volume(scan.volume_cm3)
+def scans_of(atlas: AtlasCard) -> str:
+    """Which files hold a shape that an atlas can be fitted to."""
+    if atlas.is_flat:
+        return "an outline as a drawing (SVG), as points (CSV) or in a label image (PNG, TIFF)"
+    return "a mesh, a label volume or a cloud of points"
+
+
+def size_of(scan: Scan, atlas: AtlasCard) -> str:
+    """The volume or area of a scan, or what it is where it encloses none."""
+    if scan.extent is not None:
+        return volume(scan.extent, None, atlas.frame.extent)
     return "open surface" if len(scan.faces) else "cloud of points"
 
 
-def measured(scan: Scan) -> str:
-    """The volume of a scan, or why it has none, as a line of the panel."""
-    return f"{size_of(scan)}, no volume" if scan.volume_cm3 is None else f"encloses {size_of(scan)}"
+def measured(scan: Scan, atlas: AtlasCard) -> str:
+    """The volume or area of a scan, or why it has none, as a line of the panel."""
+    told = size_of(scan, atlas)
+    return f"{told}, no {atlas.frame.extent.title}" if scan.extent is None else f"encloses {told}"
 
 
-def findings(fit: Fitted, covariates: Sequence[Covariate]) -> list[tuple[str, str, str]]:
+def findings(fit: Fitted, atlas: AtlasCard) -> list[tuple[str, str, str]]:
     """The rows of the result: what, its value with unit, and how sure or what it means.
 
     Of a fit that is not valid only how far it is off: its covariates and its volume are not the patient's.
     """
+    extent, residual = atlas.frame.extent, length(fit.residual_mm, atlas.frame.unit)
     if not fit.is_valid:
-        return [("Residual", length(fit.residual_mm), RESIDUAL), ("Time", duration(fit.seconds), "")]
+        return [("Residual", residual, RESIDUAL), ("Time", duration(fit.seconds), "")]
     values = dict(fit.values)
     sure = {name: (low, high) for name, low, high in fit.intervals}
     rows = []
-    for each in covariates:
+    for each in atlas.covariates:
         value = values[each.name]
         if each.name in sure:
             told = reading(each, value), interval_reading(each, *sure[each.name])
@@ -68,18 +75,18 @@ def findings(fit: Fitted, covariates: Sequence[Covariate]) -> list[tuple[str, st
         lasting.append(("Lasting", f"{100 * fit.lasting:.0f} %", "of what sets the patient apart"))
     return [
         *rows,
-        ("Volume", f"{volume(fit.volume_cm3, fit.volume_margin_cm3)} (95\u00a0%)", ""),
-        ("Residual", length(fit.residual_mm), RESIDUAL),
+        (extent.title.capitalize(), f"{volume(fit.extent, fit.extent_margin, extent)} (95\u00a0%)", ""),
+        ("Residual", residual, RESIDUAL),
         *lasting,
         ("Time", duration(fit.seconds), ""),
     ]
 
 
-def found_volume(fit: Fitted | None) -> str:
+def found_volume(fit: Fitted | None, atlas: AtlasCard) -> str:
     """What the list says of a patient."""
     if fit is None:
         return "not fitted"
-    return volume(fit.volume_cm3) if fit.is_valid else "not valid"
+    return volume(fit.extent, None, atlas.frame.extent) if fit.is_valid else "not valid"
 
 
 def barred(name: str, fit: Fitted) -> str:

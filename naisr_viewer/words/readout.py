@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from naisr_viewer.words.numbers import MILLIMETRES
 
-def readout(title: str, point_mm: Sequence[float], number: str = "") -> str:
+
+def readout(title: str, point_mm: Sequence[float], number: str = "", unit: str = MILLIMETRES) -> str:
     """Where it is in the frame of the atlas, and the number there.
 
     ``Age only: +1.31 mm at 12.3, −4.0, 5.1 mm``.
 
     Args:
         title: of the view.
-        point_mm: x, y and z.
+        point_mm: x, y and, in space, z.
         number: what the surface has there, with its unit; empty for nothing.
+        unit: of length; other than of millimetres there are three decimals.
     """
-    place = ", ".join(f"{each:.1f}" for each in point_mm) + " mm"
+    decimals = 1 if unit == MILLIMETRES else 3
+    place = ", ".join(f"{each:.{decimals}f}" for each in point_mm) + f" {unit}"
     return f"{title}: " + (f"{number} at {place}" if number else place).replace("-", "−")
 
 

@@ -45,7 +45,8 @@ def status_line(now: Situation) -> str:
         return f"Updating {behind} …"
     text = _in_short(coarse or exact)
     if now.is_refining:
-        text += f" · refining to {EXACT_RESOLUTION}³, {len(exact)} of {len(now.results)} views done"
+        goal = _lattice(EXACT_RESOLUTION, now.results[0])
+        text += f" · refining to {goal}, {len(exact)} of {len(now.results)} views done"
     return " · ".join(filter(None, (text, now.halted, now.notice)))
 
 
@@ -54,7 +55,12 @@ def _in_short(results: Sequence[SurfaceResult]) -> str:
     seconds = sum({id(result.points_mm): result.seconds for result in results}.values())
     if results[0].origin is Origin.TABLES:
         return f"Preview in {1000 * seconds:.0f} ms"
-    size = results[0].request.resolution
-    text = f"{'Exact' if results[0].is_exact else 'Preview'} {size}³ in {duration(seconds)}"
+    size = _lattice(results[0].request.resolution, results[0])
+    text = f"{'Exact' if results[0].is_exact else 'Preview'} {size} in {duration(seconds)}"
     errors = [result.preview_error_mm for result in results if result.preview_error_mm is not None]
     return f"{text} · 99 % of the preview was within {length(max(0.01, *errors))}" if errors else text
+
+
+def _lattice(resolution: int, result: SurfaceResult) -> str:
+    """How fine it is: ``128³``, in the plane ``128²``."""
+    return f"{resolution}{'²' if result.dim == 2 else '³'}"

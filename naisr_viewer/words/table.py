@@ -12,9 +12,10 @@ Row = tuple[str, SurfaceResult, float | None]
 
 
 def table(state: ExplorerState, rows: Sequence[Row]) -> str:
-    """Lines of cells between tabs, the first with names and units: view, covariates, volume, its margin, cut.
+    """Lines of cells between tabs, the first with names and units: view, covariates, extent, its margin, cut.
 
-    Numbers have a decimal point; what a surface does not depend on, or is not known, is left empty.
+    The extent is a volume, or of curves an area. Numbers have a decimal point; what a surface does not
+    depend on, or is not known, is left empty.
 
     Args:
         state: what is explored; there is an atlas.
@@ -23,11 +24,13 @@ def table(state: ExplorerState, rows: Sequence[Row]) -> str:
     assert state.atlas is not None
     covariates = state.atlas.covariates
     names = [f"{each.name} [{each.unit}]" if each.unit else each.name for each in covariates]
-    lines = [["view", *names, "volume [cm³]", "half of 95 % interval [cm³]", "cut [mm²]"]]
+    extent = state.atlas.frame.extent
+    enclosed = [f"{extent.title} [{extent.unit}]", f"half of 95 % interval [{extent.unit}]"]
+    lines = [["view", *names, *enclosed, "cut [mm²]"]]
     for title, result, cut_mm2 in rows:
         values = dict(result.request.values)
         told = [each.format(values[each.name]) if each.name in values else "" for each in covariates]
         told = [text.removesuffix(each.unit).strip() for text, each in zip(told, covariates, strict=True)]
-        volumes = (result.volume_cm3 if len(result.faces) else None, result.volume_margin_cm3, cut_mm2)
+        volumes = (result.extent if len(result.faces) else None, result.extent_margin, cut_mm2)
         lines.append([title, *told, *("" if each is None else f"{each:.6g}" for each in volumes)])
     return "".join("\t".join(" ".join(cell.split()) for cell in line) + "\n" for line in lines)

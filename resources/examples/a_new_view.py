@@ -26,6 +26,7 @@ from naisr_viewer.panels.kinds import KINDS
 from naisr_viewer.program import start
 from naisr_viewer.program.display import ensure_display
 from naisr_viewer.program.headless import take_screenshot
+from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.layouts import FULL_SHAPE, Layout, Panel
 from naisr_viewer.state.requests import Colouring, SurfaceRequest, SurfaceResult
 from naisr_viewer.words.captions import Caption, large
@@ -57,7 +58,7 @@ def grown(source: Source, request: SurfaceRequest, progress: Progress) -> Surfac
 # %% What the view says of itself.
 
 
-def told(result: SurfaceResult) -> Caption:
+def told(_atlas: AtlasCard, result: SurfaceResult) -> Caption:
     """The mean speed."""
     if result.colouring is None:
         return Caption(large("…"), "")

@@ -2,62 +2,26 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
 from pathlib import Path
 
 import numpy as np
 import pytest
+from eggs import ellipse
 
 from naisr_model import cli
 from naisr_model.atlas import Atlas
-from naisr_model.config import Preset, SirenConfig
 from naisr_model.data.curves import sound_curve
 from naisr_model.data.prepare import PrepareOptions, prepare
-from naisr_model.data.store import SampleStore
 from naisr_model.errors import InputError
 from naisr_model.evaluation.metrics import compare
-from naisr_model.learning.training.loop import train
-from naisr_model.models.factory import preset
-from naisr_model.models.naisr.network import NaisrConfig
-from naisr_model.shapes.curve import Curve, closed
-from naisr_model.shapes.written import csv_bytes
-from naisr_viewer.app import main as viewer
-
-
-def ellipse(age: float) -> Curve:
-    """20 mm wide; age, 1 to 9, makes it taller. Its area is pi 10 (10 + age) mm²."""
-    angles = np.linspace(0, 2 * math.pi, 120, endpoint=False)
-    return closed([np.stack([10 * np.cos(angles), (10 + age) * np.sin(angles)], axis=1)])
+from naisr_model.shapes.curve import Curve
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory) -> Path:
-    folder = tmp_path_factory.mktemp("plane")
-    lines = ["mesh,subject,age [years]"]
-    for number in range(20):
-        age = 1 + 8 * number / 19
-        (folder / f"c{number}.csv").write_bytes(csv_bytes(ellipse(age)))
-        lines.append(f"c{number}.csv,s{number},{age}")
-    (folder / "ellipses.csv").write_text("\n".join(lines))
-    report = prepare(
-        folder / "ellipses.csv", folder / "store", options=PrepareOptions(1000, 1000, 1000, 0.2, workers=1)
-    )
-    assert not report.rejected
-    training = dataclasses.replace(
-        preset("starman-demo").training,
-        epochs=250,
-        batch_shapes=8,
-        template_rate=2e-3,
-        displacement_rate=2e-3,
-        template_epochs=(1,),
-    )
-    small = NaisrConfig(
-        dim=2, latent=2, template=SirenConfig(32, 1, omega0=5.0), displacement=SirenConfig(16, 1, omega0=2.0)
-    )
-    train(SampleStore.open(folder / "store"), Preset("naisr", small, training), folder / "a.safetensors")
-    return folder
+def made(ellipses) -> Path:
+    return ellipses
 
 
 @pytest.fixture(scope="module")
@@ -134,8 +98,3 @@ def test_a_curve_among_meshes_is_told(egg_table, made, tmp_path) -> None:
     )
     assert [remark.row for remark in report.rejected] == [10]
     assert "it is a curve, most others are meshes" in report.rejected[0].reason
-
-
-def test_the_window_says_that_it_shows_surfaces(made, capsys, monkeypatch) -> None:
-    assert viewer([str(made / "a.safetensors"), "--screenshot", str(made / "w.png")]) == 2
-    assert "curves in the plane" in capsys.readouterr().err and not (made / "w.png").exists()

@@ -11,17 +11,18 @@ from naisr_model.checkpoint import load
 from naisr_model.config import read_toml
 from naisr_model.covariates import normalised_vector
 from naisr_model.data.align import rigid_transform
-from naisr_model.data.populations import airway
+from naisr_model.data.populations import airway, starman
 from naisr_model.evaluation.held_out import held_out, held_out_rows
 from naisr_model.evaluation.metrics import HAUSDORFF, Pair, compare, component_count
 from naisr_model.evaluation.truth import plausible_values
 from naisr_model.models.factory import preset
-from naisr_model.shipped import shipped_atlas
+from naisr_model.shipped import ATLASES, shipped_atlas
 from naisr_model.surface.fields import shape_field
 from naisr_model.surface.isosurface import isosurface
 from naisr_model.surface.lattice import Lattice
 from naisr_model.surface.sparse import evaluate_band, evaluate_everywhere
 
+PRESETS = {"starman": "starman-demo"}
 RESOURCES = Path(__file__).parents[2] / "resources"
 
 
@@ -30,9 +31,9 @@ def atlas() -> Atlas:
     return Atlas.load(RESOURCES / "airway.safetensors")
 
 
-@pytest.mark.parametrize("name", ["airway", "bodies"])
+@pytest.mark.parametrize("name", ATLASES)
 def test_the_settings_beside_an_atlas_are_those_it_was_trained_with(name):
-    settings = read_toml(RESOURCES / f"{name}.toml", preset("demo"))
+    settings = read_toml(RESOURCES / f"{name}.toml", preset(PRESETS.get(name, "demo")))
     assert load(RESOURCES / f"{name}.safetensors").preset == settings
 
 
@@ -46,6 +47,18 @@ def test_they_load_and_stay_small(name):
     assert path.stat().st_size < 8e6
     shape = Atlas.load(path).template(128)
     assert shape.is_watertight and component_count(shape) == 1
+
+
+def test_little_men_lift_their_arms_and_split_their_legs_as_the_generator_s_do():
+    path = shipped_atlas("starman")
+    assert path.stat().st_size < 2e6
+    men = Atlas.load(path)
+    for moved, _, values in starman.growth_path():
+        truth, shape = starman.true_shape(values), men.effect(moved, values[moved])
+        if values == {**men.population.centre, **dict.fromkeys(values, 0.0), moved: values[moved]}:
+            assert component_count(shape) == 1
+            assert shape.volume == pytest.approx(truth.volume, rel=0.08)
+            assert HAUSDORFF.measure(Pair(truth, shape, samples=2000)) <= 9
 
 
 @pytest.mark.parametrize("sex", [-1.0, 1.0])

@@ -15,22 +15,19 @@ from naisr_model.progress import Progress
 from naisr_viewer.engine.maps import coloured
 from naisr_viewer.engine.people import FittedPerson
 from naisr_viewer.engine.previews import Previews
-from naisr_viewer.engine.surfaces import deviation_mm, from_mesh
+from naisr_viewer.engine.surfaces import deviation_mm, from_shape
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.layouts import FULL_SHAPE, TEMPLATE, Panel
 from naisr_viewer.state.requests import EXACT_RESOLUTION, SurfaceRequest, SurfaceResult
 
 if TYPE_CHECKING:
-    import trimesh
-
     from naisr_model.atlas import Atlas
     from naisr_model.measures.curves import Gauge
     from naisr_model.measures.norms import Norms
+    from naisr_model.shapes.kinds import Shape
     from naisr_model.surface.tracking import Tracker
 
-    Make = Callable[
-        [Atlas, SurfaceRequest, NDArray[np.float64] | None, Tracker | None, Progress], trimesh.Trimesh
-    ]
+    Make = Callable[[Atlas, SurfaceRequest, NDArray[np.float64] | None, Tracker | None, Progress], Shape]
     """What the networks have at the values of a request, for a code (None for the average's); a tracker
     tells them where to look first."""
 
@@ -95,7 +92,7 @@ class Answer:
 def field_of_the_model(make: Make) -> Answer:
     """The surface of Phi, of a Phi_i or of T: from the tables while it moves, from the networks at rest.
 
-    A person's has the margin of its volume at rest, and where there was a preview, how far off that was.
+    A person's has the margin of its extent at rest, and where there was a preview, how far off that was.
     Requests with one and the same surface share an answer, see :func:`simplest`.
     """
 
@@ -109,10 +106,10 @@ def field_of_the_model(make: Make) -> Answer:
         latent = _latent(fitted, request)
         mesh = make(atlas, request, latent, tracker, progress)
         progress.check()
-        result = from_mesh(request, mesh, start)
+        result = from_shape(request, mesh, atlas.frame, start)
         if fitted is not None and result.is_exact:
-            margin_cm3 = fitted.at(request.values).volume_margin_cm3(mesh)
-            result = replace(result, volume_margin_cm3=margin_cm3)
+            margin = fitted.at(request.values).extent_margin(mesh)
+            result = replace(result, extent_margin=margin)
         if tracker is not None and len(result.faces):
             error_mm = deviation_mm(source.previews.track(request, tracker).points_mm, result)
             result = replace(result, preview_error_mm=error_mm)

@@ -23,7 +23,7 @@ def _give(source: Source, request: SurfaceRequest, _progress: Progress) -> Surfa
         limit = limit_mm(fitted.atlas_model, SHARE)
         colouring = Colouring(outside_mm(fitted.scan, earlier.scan), limit, "signed")
     found = from_scan(request, fitted.scan, start)
-    return replace(found, volume_before_cm3=earlier.scan.volume_cm3, colouring=colouring)
+    return replace(found, extent_before=earlier.scan.extent, colouring=colouring)
 
 
 ANSWER = Answer(_give)

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from naisr_model.exports import FORMATS
+from naisr_model.exports import CURVE_FORMATS, FORMATS
 from naisr_viewer.panels.kinds import panels_in, title_of, visible_panels
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Layout, Panel
@@ -29,6 +29,10 @@ FIGURES = ("pdf", "svg")
 RESOLUTIONS = (64, EXACT_RESOLUTION, 192, 256)
 
 
+FLAT_NOTE = (
+    "In the unit of the atlas, y upwards. A record beside each file (.json) tells the covariates and the "
+    "atlas. CSV also holds the numbers that are shown as colours."
+)
 NOTE = (
     "Millimetres, z up; GLB: metres, y up, as the format says. A record beside each file (.json) tells the "
     "covariates and the atlas. PLY and VTP also hold the numbers that are shown as colours."
@@ -46,7 +50,9 @@ class ExportDialog(QDialog):
     def __init__(self, state: ExplorerState, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         assert state.atlas is not None
-        self.setWindowTitle("Export surfaces")
+        is_flat = state.atlas.is_flat
+        self._note = FLAT_NOTE if is_flat else NOTE
+        self.setWindowTitle("Export curves" if is_flat else "Export surfaces")
         self.setMinimumWidth(460)
         on_screen = visible_panels(state)
         is_matrix = state.layout is Layout.MATRIX
@@ -58,11 +64,11 @@ class ExportDialog(QDialog):
             self.what.addItem(title_of(panel), (panel,))
         self.figure: QComboBox | None = QComboBox(self) if is_matrix else None
         self.format = QComboBox(self)
-        self.format.addItems([name.upper() for name in FORMATS])
+        self.format.addItems([name.upper() for name in (CURVE_FORMATS if is_flat else FORMATS)])
         self.detail = QComboBox(self)
         for resolution in RESOLUTIONS:
             usual = " (as on screen)" if resolution == EXACT_RESOLUTION else ""
-            self.detail.addItem(f"{resolution}³{usual}", resolution)
+            self.detail.addItem(f"{resolution}{'²' if is_flat else '³'}{usual}", resolution)
         self.detail.setCurrentIndex(RESOLUTIONS.index(EXACT_RESOLUTION))
         self.folder = QLineEdit(str(Path.home()), self)
         self._compose()
@@ -87,7 +93,7 @@ class ExportDialog(QDialog):
         where.addWidget(self.folder, 1)
         where.addWidget(browse)
         form = QFormLayout()
-        form.addRow("&Surfaces", self.what)
+        form.addRow("&Surfaces" if self._note is NOTE else "&Curves", self.what)
         if self.figure is not None:
             self.figure.addItems([name.upper() for name in FIGURES])
             form.addRow("F&igure", self.figure)
@@ -97,7 +103,7 @@ class ExportDialog(QDialog):
         label = QLabel("F&older", self)
         label.setBuddy(self.folder)
         form.addRow(label, where)
-        note = QLabel(NOTE, self)
+        note = QLabel(self._note, self)
         note.setObjectName("muted")
         note.setWordWrap(True)
         column = column_in(self)

@@ -7,6 +7,7 @@ from pathlib import Path
 from PySide6.QtCore import QMimeData
 from PySide6.QtWidgets import QFileDialog, QWidget
 
+from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.words.names import seen_stem
 
@@ -22,6 +23,9 @@ SCAN_ENDINGS = (
 )
 """Meshes, label volumes and text files of points that can be opened as a scan."""
 
+OUTLINE_ENDINGS = ("svg", "csv", "txt", "png", "tif", "tiff")
+"""Drawings, text files of points and label images that can be opened as a scan for an atlas in the plane."""
+
 
 def ask_open_path(parent: QWidget) -> Path | None:
     """The atlas to open, or None."""
@@ -29,10 +33,12 @@ def ask_open_path(parent: QWidget) -> Path | None:
     return Path(name) if name else None
 
 
-def ask_scan_path(parent: QWidget) -> Path | None:
+def ask_scan_path(parent: QWidget, atlas: AtlasCard | None) -> Path | None:
     """The scan to open, or None."""
-    endings = " ".join(f"*.{ending}" for ending in SCAN_ENDINGS)
-    filters = f"Meshes, label volumes and points ({endings});;All files (*)"
+    is_flat = atlas is not None and atlas.is_flat
+    what = "Drawings, points and label images" if is_flat else "Meshes, label volumes and points"
+    endings = " ".join(f"*.{ending}" for ending in (OUTLINE_ENDINGS if is_flat else SCAN_ENDINGS))
+    filters = f"{what} ({endings});;All files (*)"
     name, _ = QFileDialog.getOpenFileName(parent, "Open a scan", "", filters)
     return Path(name) if name else None
 
@@ -93,7 +99,7 @@ def dropped(data: QMimeData) -> list[Path]:
 
 def is_scan(file: Path) -> bool:
     """Whether a file has the ending of what can be opened as a scan."""
-    return file.name.lower().endswith(tuple(f".{ending}" for ending in SCAN_ENDINGS))
+    return file.name.lower().endswith(tuple(f".{ending}" for ending in (*SCAN_ENDINGS, *OUTLINE_ENDINGS)))
 
 
 def is_atlas(file: Path) -> bool:

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.patients import OpenScan
 from naisr_viewer.views.colours import patient_colour
 from naisr_viewer.views.elided import ElidedLabel
@@ -42,12 +43,14 @@ class PatientList(QListWidget):
         self.currentItemChanged.connect(lambda _item: self.patient_chosen.emit(self._key()))
         self._patients: tuple[OpenScan, ...] = ()
 
-    def show_patients(self, patients: tuple[OpenScan, ...], shown: int | None) -> None:
+    def show_patients(
+        self, patients: tuple[OpenScan, ...], shown: int | None, atlas: AtlasCard | None
+    ) -> None:
         """Bring the rows up to date and mark the one that is shown."""
         with QSignalBlocker(self):
             if patients != self._patients:
                 self._patients = patients
-                self._fill()
+                self._fill(atlas)
             self.setCurrentRow([None, *(patient.key for patient in patients)].index(shown))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -63,12 +66,13 @@ class PatientList(QListWidget):
         super().resizeEvent(event)
         self.scheduleDelayedItemsLayout()
 
-    def _fill(self) -> None:
+    def _fill(self, atlas: AtlasCard | None) -> None:
         self.clear()
         self._add(AVERAGE, "", "The atlas without anybody's own shape")
         for patient in self._patients:
-            close = self._close_button(patient)
-            self._add(patient.name, found_volume(patient.fit), str(patient.reading.path), patient.key, close)
+            assert atlas is not None  # scans are of an atlas
+            close, found = self._close_button(patient), found_volume(patient.fit, atlas)
+            self._add(patient.name, found, str(patient.reading.path), patient.key, close)
         self.setFixedHeight(min(self.count(), ROWS_IN_SIGHT) * ROW_HEIGHT + LIST_BORDER)
 
     def _add(self, name: str, note: str, tip: str, key: int | None = None, *beside: QWidget) -> None:

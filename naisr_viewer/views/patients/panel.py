@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QScrollArea, QVBoxLay
 
 from naisr_model.covariates import Covariate
 from naisr_viewer.panels.kinds import layouts_of
+from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.curves import Standing
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Layout
@@ -20,11 +21,12 @@ from naisr_viewer.views.patients.list import PatientList
 from naisr_viewer.views.patients.pieces import button, exchange, paragraph
 from naisr_viewer.views.patients.result import ComparePart, result_part, standings_part
 from naisr_viewer.views.patients.scan import AlignmentPart, ScanPart
+from naisr_viewer.words.numbers import capitalised
+from naisr_viewer.words.patients import scans_of
 
 PANEL_WIDTH = 300
 LEAST_WIDTH = 248
 MARGIN_PX = 14
-INVITATION = "Open a scan to fit the atlas to it: a mesh, a label volume or a cloud of points."
 
 
 class PatientPanel(QFrame):
@@ -49,8 +51,8 @@ class PatientPanel(QFrame):
         self._area = QScrollArea(self)
         self._inside = QWidget(self._area)
         self._head, self._foot = QWidget(self), QWidget(self)
-        self.open = button("Open scan…", "A mesh, a label volume or a cloud of points")
-        self.invitation = paragraph(INVITATION, "muted")
+        self.open = button("Open scan…", "")
+        self.invitation = paragraph(style="muted")
         self.list = PatientList(self._inside)
         self.scan = ScanPart(self._inside)
         self.alignment = AlignmentPart(self._inside)
@@ -67,11 +69,12 @@ class PatientPanel(QFrame):
         if state.atlas is not None and state.atlas is not old.atlas:
             self._drafts = {}
             self._show_rows(state.atlas.covariates)
+            self._say_what_opens(state.atlas)
         self._show_known(old.shown if state.atlas is old.atlas else None, state.shown)
         self.open.setEnabled(state.atlas is not None)
         self.invitation.setVisible(not state.patients)
         self.list.setVisible(bool(state.patients))
-        self.list.show_patients(state.patients, state.patient)
+        self.list.show_patients(state.patients, state.patient, state.atlas)
         for part in (self.scan, self.alignment, self.known, self._foot):
             part.setVisible(state.shown is not None)
         self.result.setVisible(state.fit is not None)
@@ -135,12 +138,13 @@ class PatientPanel(QFrame):
 
     def _show_patient(self, new: OpenScan, old: OpenScan | None) -> None:
         state = self._state
-        self.scan.show_patient(new, state.has_ghost)
+        assert state.atlas is not None
+        self.scan.show_patient(new, state.has_ghost, state.atlas)
         self.alignment.show_patient(new, state.has_ghost)
         self.known.show_patient(new)
         self.compare.show_state(state)
-        if new.fit is not None and state.atlas is not None and (old is None or new.fit is not old.fit):
-            self.result = exchange(self.result, result_part(new.fit, state.atlas.covariates))
+        if new.fit is not None and (old is None or new.fit is not old.fit):
+            self.result = exchange(self.result, result_part(new.fit, state.atlas))
             if old is not None and old.key == new.key:
                 QTimer.singleShot(0, self, self._reveal_result)
 
@@ -153,6 +157,12 @@ class PatientPanel(QFrame):
         self._area.ensureWidgetVisible(self.alignment.method, 0, 16)
         self.alignment.method.setFocus()
         self.alignment.method.showPopup()
+
+    def _say_what_opens(self, atlas: AtlasCard) -> None:
+        """Which files hold a patient's shape; curves are fitted where they lie."""
+        self.open.setToolTip(capitalised(scans_of(atlas)))
+        self.invitation.setText(f"Open a scan to fit the atlas to it: {scans_of(atlas)}.")
+        self.alignment.show_atlas(atlas)
 
     def _show_rows(self, covariates: Sequence[Covariate]) -> None:
         """Made later than what stands below them, so that the Tab key has to be told."""

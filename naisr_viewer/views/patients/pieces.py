@@ -110,12 +110,18 @@ class ChoiceBox(QComboBox):
     def __init__(self, name: str, tip: str, parent: QWidget) -> None:
         super().__init__(parent)
         self.setAccessibleName(name)
-        self._tip = tip
+        self._tip, self._reason = tip, ""
         self.setToolTip(tip)
         self.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         self.setMinimumContentsLength(8)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setItemDelegate(QStyledItemDelegate(self))  # the usual one hardly marks the entry
+
+    def refuse(self, reason: str) -> None:
+        """Let nothing be chosen for a reason, which is told on hover; where there is none, let it."""
+        self._reason = reason
+        self.setEnabled(not reason)
+        self.setToolTip(reason or self._tip)
 
     def show_choices(
         self,
@@ -139,7 +145,7 @@ class ChoiceBox(QComboBox):
             for index, (data, text) in enumerate(wanted):
                 self._bar(index, text, (barred or {}).get(data, ""))
             self.setCurrentIndex([data for data, _ in wanted].index(current))
-        self.setToolTip(as_tip(f"{self._tip}:\n{self.currentText()}"))
+        self.setToolTip(as_tip(self._reason or f"{self._tip}:\n{self.currentText()}"))
 
     def _bar(self, index: int, text: str, reason: str) -> None:
         """Let an entry be chosen unless there is a reason against it, which is told on hover."""

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 
-from naisr_model.covariates import Covariate
+from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.curves import Standing
 from naisr_viewer.state.explorer import AVERAGE_KEY, ExplorerState
 from naisr_viewer.state.patients import Fitted
@@ -36,7 +36,7 @@ def standings_part(standings: Sequence[Standing]) -> QWidget:
     return part
 
 
-def result_part(fit: Fitted, covariates: Sequence[Covariate]) -> QWidget:
+def result_part(fit: Fitted, atlas: AtlasCard) -> QWidget:
     """What ``fit`` found, and how sure it is."""
     part, table = QWidget(), QWidget()
     column = section(part, "Result")
@@ -47,7 +47,7 @@ def result_part(fit: Fitted, covariates: Sequence[Covariate]) -> QWidget:
         column.addWidget(warnings(fit.remarks))
     grid = grid_in(table, 12, 0, wide=1)
     top, right = Qt.AlignmentFlag.AlignTop, Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignRight
-    for row, (what, value, sure) in enumerate(findings(fit, covariates)):
+    for row, (what, value, sure) in enumerate(findings(fit, atlas)):
         figure = paragraph(breakable(value, LONGEST_IN_TABLE), "figure", right)
         figure.setAccessibleName(f"{what}: {value}")
         grid.addWidget(paragraph(breakable(what, LONGEST_IN_TABLE), "muted", top), 3 * row, 0)

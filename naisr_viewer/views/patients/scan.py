@@ -8,16 +8,20 @@ from pathlib import Path
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QFormLayout, QFrame, QHBoxLayout, QVBoxLayout, QWidget
 
+from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.patients import Method, OpenScan, Reading
 from naisr_viewer.views.dialogs.files import ask_landmarks_path
 from naisr_viewer.views.elided import ElidedCheckBox, ElidedLabel
 from naisr_viewer.views.patients.pieces import ChoiceBox, button, exchange, paragraph, section, warnings
+from naisr_viewer.words.numbers import MILLIMETRES
 from naisr_viewer.words.patients import METHODS, breakable, measured, sentence, units
 from naisr_viewer.words.titles import as_tip
 
 REREAD_TIP = "Read the file from the disk again, for example after it was edited"
 RELABEL_TIP = "Read another label of the same volume; Ctrl+Z comes back to this one"
 GHOST_TIP = "Draw what was measured, transparent, over the atlas's shape"
+LIES_STILL = "Curves are fitted where they lie: give them in the frame of the atlas"
+NO_UNIT = "The atlas's lengths have no unit: the numbers of the file are taken as they are"
 SEE_FIRST = "The scan is drawn over the atlas as it lies; see that it fits before it is fitted."
 
 
@@ -41,12 +45,12 @@ class ScanPart(QWidget):
         self.ghost = ElidedCheckBox("Show the scan over the shape", GHOST_TIP, self)
         self._compose()
 
-    def show_patient(self, patient: OpenScan, has_ghost: bool) -> None:
+    def show_patient(self, patient: OpenScan, has_ghost: bool, atlas: AtlasCard) -> None:
         """Show ``patient``'s scan."""
         scan = patient.scan
         self.source.setText(breakable(scan.source))
         self.source.setToolTip(as_tip(str(patient.reading.path)))
-        self.volume.setText(measured(scan))
+        self.volume.setText(measured(scan, atlas))
         if scan.notes != self._notes_shown:
             self._notes_shown = scan.notes
             self.notes = exchange(self.notes, warnings(scan.notes))
@@ -100,6 +104,11 @@ class AlignmentPart(QWidget):
         column.addWidget(self.hint)
         self.method.activated.connect(self._method_chosen)
         self.unit.activated.connect(self._unit_chosen)
+
+    def show_atlas(self, atlas: AtlasCard) -> None:
+        """Offer what makes sense for its shapes, and say why nothing else does."""
+        self.method.refuse(LIES_STILL if atlas.is_flat else "")
+        self.unit.refuse("" if atlas.frame.unit == MILLIMETRES else NO_UNIT)
 
     def show_patient(self, patient: OpenScan, has_ghost: bool) -> None:
         """Show how ``patient``'s file was read, and that it can be seen where the scan lies."""

@@ -26,6 +26,10 @@ OBLIQUE = ((0.9, -0.45, 0.15), (0.0, 0.0, 1.0))
 """The view an atlas opens with: from the left and a little from the front."""
 
 
+FLAT = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0))
+"""The one view of curves in the plane: x to the right, y upwards."""
+
+
 def aim(camera: pv.Camera, box_mm: NDArray[np.float64]) -> None:
     """Look at the middle of a box ``[3, 2]`` from well outside, keeping the direction."""
     direction = np.subtract(camera.position, camera.focal_point)

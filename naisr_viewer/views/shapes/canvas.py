@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pyvista as pv
@@ -27,7 +28,7 @@ from naisr_viewer.views.shapes.camera import (
     zoom_at,
 )
 from naisr_viewer.views.shapes.looks import INK, INKINESS, POINT_PX, as_ghost, as_marks, clip, make_cap
-from naisr_viewer.views.shapes.sub_plot import SubPlot, picked, set_colouring, set_points
+from naisr_viewer.views.shapes.sub_plot import SubPlot, picked, set_colouring, set_nothing, set_points
 
 REST_SAMPLES = 4
 """Multi-sampling at rest; none while something moves, where it costs two thirds of a frame."""
@@ -37,6 +38,11 @@ HOVER_MS = 80
 
 NOTCH, NOTCH_ZOOM = 120, 1.15
 """Of a wheel, in Qt's units; how much larger it shows everything."""
+
+MOVED: dict[str, Any] = {
+    f"{keys}{button}": "pan" for keys in ("", "shift_", "control_") for button in ("left", "middle")
+}
+"""What dragging does to curves in the plane."""
 
 CLICK_PX = 4
 """A mouse that has gone so far between press and release has turned the shapes."""
@@ -50,6 +56,7 @@ class Canvas(QtInteractor):
     Args:
         colours: one sub-plot, still empty and hidden, for each of these (``#rrggbb``).
         parent: the widget around it.
+        is_flat: whether curves in the plane are shown: they are moved and never turned.
     """
 
     drawn = Signal(int)  # the picture is on its way to the screen; how many sub-plots were drawn anew
@@ -59,7 +66,8 @@ class Canvas(QtInteractor):
     hovered = Signal(int, object)  # the mouse rests: over which sub-plot, and the Hit there or None
     left = Signal()  # what was told of the mouse holds no more
 
-    def __init__(self, colours: Sequence[str], parent: QWidget) -> None:
+    def __init__(self, colours: Sequence[str], parent: QWidget, is_flat: bool = False) -> None:
+        self._is_flat = is_flat
         self._plots: list[SubPlot] = []
         self._ghost_colour, self._ground = "#000000", "#ffffff"
         self._is_moving = self._is_held = False
@@ -81,6 +89,8 @@ class Canvas(QtInteractor):
         self._plots = [self._sub_plot(index, colour) for index, colour in enumerate(colours)]
         self.link_views()
         self.enable_parallel_projection()
+        if is_flat:
+            self.enable_custom_trackball_style(**MOVED)
 
     def set_surface(self, index: int, result: SurfaceResult) -> None:
         """Show a surface; where only its vertices moved, nothing else is sent to OpenGL again."""
@@ -99,9 +109,8 @@ class Canvas(QtInteractor):
     def clear_surface(self, index: int) -> None:
         """Show nothing until the next surface comes."""
         plot = self._plots[index]
-        plot.result = None
         self._forget_hover()
-        plot.mesh.copy_from(pv.PolyData(), deep=False)
+        set_nothing(plot)
         plot.is_stale = True
         self.update()
 
@@ -135,7 +144,7 @@ class Canvas(QtInteractor):
     def set_cut(self, index: int, cut: Cut | None) -> None:
         """Fill what the plane cuts of a surface; None removes that."""
         plot = self._plots[index]
-        if plot.cap is None and cut is None:
+        if self._is_flat or (plot.cap is None and cut is None):
             return
         if plot.cap is None:
             plot.cap = make_cap()
@@ -409,6 +418,9 @@ class Canvas(QtInteractor):
         plot = SubPlot(self.renderers[index], actor, mesh, colour)
         plot.renderer.SetUseOIT(False)  # a ghost is one layer: nothing to sort, which would cost time
         set_colouring(plot, None)
+        if self._is_flat:
+            plot.cap = make_cap(actor)
+            plot.renderer.add_actor(plot.cap.filled, render=False, reset_camera=False)
         return plot
 
 

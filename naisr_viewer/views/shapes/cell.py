@@ -9,7 +9,7 @@ from PySide6.QtCore import QRect, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QLabel, QWidget
 
-from naisr_viewer.panels.kinds import kind_of, title_of
+from naisr_viewer.panels.kinds import hint_of, kind_of, title_of, unit_of
 from naisr_viewer.panels.scales import PanelScale
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.layouts import Panel
@@ -80,7 +80,7 @@ class Cell:
         title: what stands above.
         caption: the label beneath.
         bar: what its colours stand for; None where it never has any.
-        compass: which way the body lies.
+        compass: which way the body lies; None in the plane.
         words: what the caption says.
         scale: of its colours; None where it has none now.
         result: the surface, or None as long as there is none.
@@ -91,7 +91,7 @@ class Cell:
     title: Title
     caption: QLabel
     bar: ColourBar | None
-    compass: Compass
+    compass: Compass | None
     words: str = ""
     scale: PanelScale | None = None
     result: SurfaceResult | None = None
@@ -138,8 +138,9 @@ class Cell:
         if self.bar is not None:
             self.bar.setVisible(is_seen and self.scale is not None)
             self.bar.raise_()
-        self.compass.setVisible(is_seen and self.has_room)
-        self.compass.raise_()
+        if self.compass is not None:
+            self.compass.setVisible(is_seen and self.has_room)
+            self.compass.raise_()
 
     def discard(self) -> None:
         """Take it all away."""
@@ -160,7 +161,8 @@ class Cell:
         self.caption.setGeometry(area.left(), top, area.width(), area.bottom() + 1 - top)
         wide, high = COMPASS_WIDE * area.width(), COMPASS_HIGH * (top - area.top() - strips.title)
         self.has_room = min(wide, high) >= SIZE_PX
-        self.compass.move(area.left() + COMPASS_GAP_PX, top - SIZE_PX - COMPASS_GAP_PX)
+        if self.compass is not None:
+            self.compass.move(area.left() + COMPASS_GAP_PX, top - SIZE_PX - COMPASS_GAP_PX)
         if self.bar is not None:
             width = min(WIDTH_PX, area.width())
             self.bar.setGeometry(area.left() + (area.width() - width) // 2, top, width, strips.bar)
@@ -169,14 +171,18 @@ class Cell:
 def make_cell(panel: Panel, atlas: AtlasCard, parent: QWidget) -> Cell:
     """The labels of a sub-plot, still without a place, and its colour bar where it has one."""
     title = Title(title_of(panel), panel_colour(atlas, panel), parent)
-    title.set_hint(kind_of(panel).hint)
-    title.setWhatsThis(kind_of(panel).hint)
+    title.set_hint(hint_of(panel, atlas))
+    title.setWhatsThis(hint_of(panel, atlas))
     caption = QLabel(parent)
     caption.setObjectName("caption")
     caption.setWordWrap(True)
     caption.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
     kind = kind_of(panel)
-    bar = ColourBar(kind.scale or "signed", kind.unit, parent) if kind.scale or kind.is_mapped else None
+    bar = (
+        ColourBar(kind.scale or "signed", unit_of(panel, atlas), parent)
+        if kind.scale or kind.is_mapped
+        else None
+    )
     if bar is not None:
-        bar.setToolTip(kind_of(panel).hint)
-    return Cell(title, caption, bar, Compass(parent))
+        bar.setToolTip(hint_of(panel, atlas))
+    return Cell(title, caption, bar, None if atlas.is_flat else Compass(parent))

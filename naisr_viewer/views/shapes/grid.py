@@ -94,7 +94,8 @@ class Grid:
         """Have all compasses follow the camera; directions in the picture, of length 1."""
         found = ends(right, up)
         for cell in self.cells.values():
-            cell.compass.show_ends(found)
+            if cell.compass is not None:
+                cell.compass.show_ends(found)
 
     def outline(self, panel: Panel | None) -> None:
         """Draw a line around a sub-plot, and around no other."""

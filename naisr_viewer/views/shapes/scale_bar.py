@@ -8,6 +8,8 @@ from PySide6.QtCore import QPointF, QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent, QPalette, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from naisr_viewer.words.numbers import MILLIMETRES
+
 LONGEST_PX = 90
 
 
@@ -23,13 +25,18 @@ class ScaleBar(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.pixels_per_mm = 1.0
+        self.pixels_per_mm, self.unit = 1.0, MILLIMETRES
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setToolTip("All views are drawn to this scale")
 
     def set_scale(self, pixels_per_mm: float) -> None:
         """Follow the zoom."""
         self.pixels_per_mm = pixels_per_mm
+        self.update()
+
+    def show_unit(self, unit: str) -> None:
+        """Tell lengths in another unit."""
+        self.unit = unit
         self.update()
 
     def sizeHint(self) -> QSize:
@@ -40,7 +47,7 @@ class ScaleBar(QWidget):
         """The label at the right end, the line before it."""
         length_mm = round_length_mm(self.pixels_per_mm)
         painter = QPainter(self)
-        text = f"{length_mm:,.0f} mm" if length_mm >= 1 else f"{length_mm:g} mm"
+        text = f"{length_mm:,.0f} {self.unit}" if length_mm >= 1 else f"{length_mm:g} {self.unit}"
         room = painter.fontMetrics().horizontalAdvance(text) + 14
         right, middle = self.width() - room - 6.0, self.height() / 2
         left = right - length_mm * self.pixels_per_mm

@@ -30,7 +30,7 @@ from naisr_viewer.views.shapes.arrangement import (
     scale_to_fit,
     viewport,
 )
-from naisr_viewer.views.shapes.camera import DIRECTIONS, OBLIQUE, Direction, axes_of
+from naisr_viewer.views.shapes.camera import DIRECTIONS, FLAT, OBLIQUE, Direction, axes_of
 from naisr_viewer.views.shapes.cell import columns_of, strips_of
 from naisr_viewer.views.shapes.drawing import Drawing, reserve_opengl
 from naisr_viewer.views.shapes.grid import Grid
@@ -150,7 +150,7 @@ class ShapeView(QWidget):
                 cell.bar.fit_requested.connect(lambda panel=panel: self.fit_requested.emit(panel))
         self._ghost, self._marks, self._colours = (None, NO_FACES), {}, {}
         self._section = None
-        self._direction = OBLIQUE
+        self._direction = self._opening
         self._theme = theme
         self._open_canvas()
 
@@ -221,8 +221,8 @@ class ShapeView(QWidget):
         """Lay a scan over the full shape, translucent; without faces as dots.
 
         Args:
-            points_mm: vertices, ``[n, 3]``; None takes the scan away.
-            faces: vertex numbers of the triangles, ``[m, 3]``; none for a cloud of points.
+            points_mm: vertices, ``[n, dim]``; None takes the scan away.
+            faces: vertex numbers of the triangles or segments, ``[m, dim]``; none for a cloud of points.
         """
         if points_mm is self._ghost[0] and faces is self._ghost[1]:
             return
@@ -287,7 +287,15 @@ class ShapeView(QWidget):
 
     def reset_camera(self) -> None:
         """The view that an atlas opens with: its direction, upright, with all that is on screen in it."""
-        self._look(OBLIQUE)
+        self._look(self._opening)
+
+    @property
+    def _opening(self) -> tuple[Direction, Direction]:
+        return FLAT if self._is_flat else OBLIQUE
+
+    @property
+    def _is_flat(self) -> bool:
+        return self._atlas is not None and self._atlas.is_flat
 
     def look_from(self, direction: str) -> None:
         """Stand at one of :data:`DIRECTIONS` and frame what is on screen."""
@@ -342,13 +350,13 @@ class ShapeView(QWidget):
         self._ring.hide()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Arrows turn the shapes, with Shift they move them; + and - zoom."""
+        """Arrows turn the shapes, with Shift, and in the plane, they move them; + and - zoom."""
         key, canvas = event.key(), self._canvas
         if canvas is None or not self._framed:
             super().keyPressEvent(event)
         elif key in ARROWS:
             across, along = ARROWS[Qt.Key(key)]
-            if event.modifiers() & Qt.KeyboardModifier.ShiftModifier:
+            if event.modifiers() & Qt.KeyboardModifier.ShiftModifier or self._is_flat:
                 canvas.pan(PAN * across, PAN * along)
             else:
                 canvas.turn(-TURN_DEG * across, -TURN_DEG * along)
@@ -369,7 +377,7 @@ class ShapeView(QWidget):
         if make_canvas is None or self._atlas is None:
             return
         colours = [panel_colour(self._atlas, panel) for panel in self._grid.cells]
-        self._canvas = make_canvas(colours, self)
+        self._canvas = make_canvas(colours, self, self._is_flat)
         self._canvas.drawn.connect(self._tell_drawn)
         self._canvas.clicked.connect(self._tell_clicked)
         self._canvas.chosen.connect(lambda index: self.chosen.emit(self._grid.panel(index)))

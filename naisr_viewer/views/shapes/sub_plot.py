@@ -8,7 +8,16 @@ from typing import NamedTuple
 import pyvista as pv
 
 from naisr_viewer.state.requests import Colouring, SurfaceResult
-from naisr_viewer.views.shapes.looks import MATT, SHINY, Cap, as_polydata, is_closed, look_up_table
+from naisr_viewer.views.shapes.looks import (
+    CUT_LINE_PX,
+    MATT,
+    NUMBERS_LINE_PX,
+    SHINY,
+    Cap,
+    as_polydata,
+    is_closed,
+    look_up_table,
+)
 
 
 @dataclass(eq=False)
@@ -23,7 +32,7 @@ class SubPlot:
         result: what ``mesh`` was made from.
         ghost: the look of what lies over the surface.
         marks: the look of the places that are marked on it.
-        cap: the look of what the section plane cuts.
+        cap: the look of what the section plane cuts; of curves in the plane, of what they enclose.
         is_pale: whether its colour is much like the ground.
         is_shown: whether it has a part of the canvas.
         is_stale: whether the canvas shows something else.
@@ -42,6 +51,11 @@ class SubPlot:
     is_stale: bool = True
 
     @property
+    def is_outline(self) -> bool:
+        """Whether curves in the plane are shown, around what they enclose."""
+        return self.cap is not None and self.cap.outline is self.actor
+
+    @property
     def boxes(self) -> list[tuple[float, ...]]:
         """Bounds of what is drawn, each x, y and z from and to (mm)."""
         boxes = [self.mesh.bounds] if self.mesh.n_points else []
@@ -50,12 +64,25 @@ class SubPlot:
 
 def set_points(plot: SubPlot, old: SurfaceResult | None, result: SurfaceResult) -> None:
     """Replace the surface of a sub-plot, or only its vertices where it has the same triangles."""
-    if old is not None and old.faces is result.faces and len(result.faces):
+    if old is not None and old.faces is result.faces and len(result.faces) and result.dim == 3:
         plot.mesh.points[:] = result.points_mm
         plot.mesh.point_data.active_normals[:] = result.normals
     else:
         plot.mesh.copy_from(as_polydata(result), deep=False)
         plot.actor.prop.culling = "back" if is_closed(result.faces) else "none"
+        _fill(plot)
+
+
+def set_nothing(plot: SubPlot) -> None:
+    """Empty a sub-plot."""
+    plot.mesh.copy_from(pv.PolyData(), deep=False)
+    _fill(plot)
+    plot.result = None
+
+
+def _fill(plot: SubPlot) -> None:
+    if plot.is_outline and plot.cap is not None:
+        plot.cap.fill(plot.mesh)
 
 
 def set_colouring(plot: SubPlot, colouring: Colouring | None) -> None:
@@ -64,6 +91,8 @@ def set_colouring(plot: SubPlot, colouring: Colouring | None) -> None:
     mapper.scalar_visibility = colouring is not None
     for name, value in (SHINY if colouring is None else MATT).items():
         setattr(plot.actor.prop, name, value)
+    if plot.is_outline:
+        plot.actor.prop.line_width = CUT_LINE_PX if colouring is None else NUMBERS_LINE_PX
     if colouring is not None:
         plot.mesh.point_data.set_scalars(colouring.values, "numbers")
         mapper.lookup_table = look_up_table(colouring.limit, colouring.scale)
@@ -92,9 +121,21 @@ def picked(plot: SubPlot, x: float, y: float) -> Hit | None:
         picker.AddPickList(plot.cap.filled)
     if not picker.Pick(x, y, 0.0, plot.renderer):
         return None
+    if plot.is_outline:
+        return _on_curve(plot, picker.GetPickPosition())
     if plot.cap is not None and picker.GetActor() is plot.cap.filled:
         return None  # what the section plane lays open is no surface
     first, second, third = picker.GetPickPosition()
+    return Hit((first, second, third), _number(plot, picker.GetPointId()))
+
+
+def _on_curve(plot: SubPlot, point_mm: tuple[float, float, float]) -> Hit:
+    """The vertex of a curve that is nearest to a point which it encloses."""
+    nearest = plot.mesh.find_closest_point(point_mm)
+    first, second, third = plot.mesh.points[nearest].tolist()
+    return Hit((first, second, third), _number(plot, nearest))
+
+
+def _number(plot: SubPlot, vertex: int) -> float | None:
     numbers = None if plot.result is None else plot.result.colouring
-    value = None if numbers is None else float(numbers.values[picker.GetPointId()])
-    return Hit((first, second, third), value)
+    return None if numbers is None else float(numbers.values[vertex])

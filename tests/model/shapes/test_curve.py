@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from naisr_model.data.populations import starman
-from naisr_model.shapes.curve import Curve, closed, enclosed_area
+from naisr_model.shapes.curve import Curve, closed, enclosed_area, thinned
 from naisr_model.shapes.kinds import KINDS, kind_of
 from naisr_model.shapes.written import csv_bytes
 
@@ -55,3 +55,13 @@ def test_what_a_store_keeps_of_a_curve_is_the_curve() -> None:
     assert kind_of(curve) is KINDS[2]
     again = KINDS[2].read(csv_bytes(curve))
     assert again.volume == pytest.approx(curve.volume, rel=1e-11) and KINDS[2].pieces(again) == 2
+
+
+def test_a_thinned_curve_encloses_nearly_as_much_and_keeps_its_holes():
+    angles = np.linspace(0, 2 * np.pi, 5000, endpoint=False)
+    circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    whole = closed([circle, 0.5 * circle, 0.1 * circle[::500]])
+    thin = thinned(whole, 200)
+    assert len(thin.vertices) < 250 and thin.pieces == 3
+    assert thin.volume == pytest.approx(whole.volume, rel=0.01)
+    assert thinned(thin, 1000) is thin

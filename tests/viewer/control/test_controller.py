@@ -134,7 +134,7 @@ def test_dragging_age_carries_only_what_age_changes_and_asks_no_network(ready, w
     assert {result.origin for result in drawn(window)} == {Origin.TABLES}
     assert len({id(result.faces) for result in drawn(window)}) == 1
     assert status(window).startswith("Preview in ")
-    assert ready.shown[AGE_ONLY].volume_cm3 == pytest.approx(atlas.volume_cm3(age=130.0), rel=0.01)
+    assert ready.shown[AGE_ONLY].extent == pytest.approx(atlas.volume_cm3(age=130.0), rel=0.01)
     window.covariates.value_settled.emit("age", 130.0)
     assert [(what, size) for what, _, size in atlas.calls] == [
         ("shape", EXACT_RESOLUTION),
@@ -179,8 +179,8 @@ def test_the_volume_beneath_a_shape_is_that_of_the_shape(ready, window, atlas):
     window.covariates.value_settled.emit("age", 200.0)
     captions = {call.args[0]: call.args[1] for call in window.shapes.set_caption.call_args_list}
     for panel in (AGE_ONLY, FULL_SHAPE):
-        assert f"{ready.shown[panel].volume_cm3:.1f} cm³" in captions[panel]
-        assert ready.shown[panel].volume_cm3 == pytest.approx(atlas.volume_cm3(age=200.0), rel=0.01)
+        assert f"{ready.shown[panel].extent:.1f} cm³" in captions[panel]
+        assert ready.shown[panel].extent == pytest.approx(atlas.volume_cm3(age=200.0), rel=0.01)
 
 
 def test_a_combination_nobody_has_is_marked(ready, window):

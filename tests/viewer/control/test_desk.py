@@ -122,7 +122,7 @@ def test_a_dropped_scan_is_shown_and_waits_to_be_fitted(ready, qtbot, scan_file)
     settle(qtbot, controller)
     state = controller.state
     assert window.patients.isVisible() and state.shown.name == "p01.stl"
-    assert state.shown.scan.volume_cm3 == pytest.approx(CUBIC_CM, rel=1e-6)
+    assert state.shown.scan.extent == pytest.approx(CUBIC_CM, rel=1e-6)
     assert state.fit is None and state.person == 0 and window.patients.known.fit.isEnabled()
 
 
@@ -139,9 +139,9 @@ def test_a_fit_ends_at_the_patient_with_an_interval(fitted):
     state = controller.state
     assert dict(state.fit.values) == {"age": 6.0, "sex": 1.0}
     assert state.layout is Layout.FIT and action(window, "Fit").isChecked()
-    assert state.fit.volume_cm3 == pytest.approx(CUBIC_CM, rel=0.03)
+    assert state.fit.extent == pytest.approx(CUBIC_CM, rel=0.03)
     assert state.fit.residual_mm < 0.5
-    assert volume(state.fit.volume_cm3, state.fit.volume_margin_cm3) in window.shapes.caption(FULL_SHAPE)
+    assert volume(state.fit.extent, state.fit.extent_margin) in window.shapes.caption(FULL_SHAPE)
     assert controller.shown[SCAN].colouring is not None
     assert controller.shown[UNCERTAINTY].colouring is not None
     assert f"residual {state.fit.residual_mm:.2f} mm" in window.shapes.caption(SCAN)
@@ -170,9 +170,9 @@ def test_years_ahead_before_and_after(fitted, qtbot):
     assert set(controller.shown) >= {BEFORE, FULL_SHAPE, CHANGE}
     before, after, change = (controller.shown[panel] for panel in (BEFORE, FULL_SHAPE, CHANGE))
     gain = (egg(8.5, 1.0).volume - egg(6.0, 1.0).volume) / 1000
-    assert after.volume_cm3 - before.volume_cm3 == pytest.approx(gain, rel=0.2)
+    assert after.extent - before.extent == pytest.approx(gain, rel=0.2)
     assert change.colouring.values.max() == pytest.approx(5, abs=1.2)  # 2 mm a year at the poles
-    assert gained(change.volume_cm3, change.volume_before_cm3, change.volume_margin_cm3) in (
+    assert gained(change.extent, change.extent_before, change.extent_margin) in (
         window.shapes.caption(CHANGE)
     )
     click(window.covariates.reset_all)
@@ -222,7 +222,7 @@ def test_a_simulated_surgery(fitted, qtbot, scan_file):
     old, new = controller.state.patients
     assert (old.name, new.name) == ("p01.stl", "p01.stl (2)") and old.fit is not None
     assert dict(window.patients.known.given()) == {"age": 6.0, "sex": 1.0}
-    assert new.scan.volume_cm3 == pytest.approx(longer.volume / 1000, rel=1e-6) and not new.is_changed
+    assert new.scan.extent == pytest.approx(longer.volume / 1000, rel=1e-6) and not new.is_changed
     check = window.patients.known.rows["age"].check
     QTest.mouseClick(check, Qt.MouseButton.LeftButton, pos=QPoint(8, check.height() // 2))
     assert dict(window.patients.known.given()) == {"sex": 1.0}  # nobody of a known age can be lengthened
@@ -232,9 +232,9 @@ def test_a_simulated_surgery(fitted, qtbot, scan_file):
     controller.set_layout(Layout.CHANGE)
     settle(qtbot, controller)
     change = controller.shown[CHANGE]
-    assert change.volume_before_cm3 == pytest.approx(old.fit.volume_cm3)
+    assert change.extent_before == pytest.approx(old.fit.extent)
     gain = longer.volume / 1000 - CUBIC_CM
-    assert change.volume_cm3 - change.volume_before_cm3 == pytest.approx(gain, rel=0.25)
+    assert change.extent - change.extent_before == pytest.approx(gain, rel=0.25)
 
 
 def test_a_stopped_fit_changes_nothing(ready, qtbot, scan_file):
@@ -306,7 +306,7 @@ def test_a_scan_astray_is_aligned_first_or_its_fit_is_told_not_valid(ready, qtbo
     assert state.fit.is_valid and action(window, "Before and after").isEnabled()
     assert state.shown.scan is not lay and "onto its own fit" in panel.alignment.sentence.text()
     assert np.abs(state.shown.scan.points_mm.mean(axis=0)).max() < 1.0
-    assert state.fit.volume_cm3 == pytest.approx(CUBIC_CM, rel=0.03)
+    assert state.fit.extent == pytest.approx(CUBIC_CM, rel=0.03)
     undo(window, qtbot, controller)
     assert controller.state.shown.scan is lay and controller.state.fit is None
     undo(window, qtbot, controller)
@@ -366,11 +366,11 @@ def test_a_label_is_chosen(ready, qtbot, tmp_path, monkeypatch):
     settle(qtbot, controller)
     assert asked == [[1, 2]]
     truth = 4 / 3 * np.pi * 18 * 17 * 22 / 1000
-    assert controller.state.shown.scan.volume_cm3 == pytest.approx(truth, rel=0.05)
+    assert controller.state.shown.scan.extent == pytest.approx(truth, rel=0.05)
     window.reading_requested.emit(Reading(path, label="2"))
     settle(qtbot, controller)
     assert asked == [[1, 2]] and len(controller.state.patients) == 2
-    assert controller.state.shown.scan.volume_cm3 == pytest.approx(truth, rel=0.05)
+    assert controller.state.shown.scan.extent == pytest.approx(truth, rel=0.05)
 
 
 def undo(window, qtbot, controller) -> None:
@@ -702,12 +702,12 @@ def test_another_label_of_an_open_volume_is_read(ready, qtbot, tmp_path, monkeyp
     monkeypatch.setattr(main_window, "ask_label", lambda *_: next(answers))
     drop(window, label_volume(tmp_path / "labels.nii"))
     settle(qtbot, controller)
-    egg_cm3 = controller.state.shown.scan.volume_cm3
+    egg_cm3 = controller.state.shown.scan.extent
     for expected in (1, 1):  # another label; then nobody chooses
         QTest.mouseClick(window.patients.scan.relabel, Qt.MouseButton.LeftButton)
         settle(qtbot, controller)
         assert controller.state.shown.reading.label == expected
-    assert controller.state.shown.scan.volume_cm3 != egg_cm3
+    assert controller.state.shown.scan.extent != egg_cm3
     window.undo_requested.emit()
     settle(qtbot, controller)
     assert controller.state.shown.reading.label == 2

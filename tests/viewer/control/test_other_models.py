@@ -59,7 +59,7 @@ def test_a_scan_is_fitted_by_its_code_alone(ready, tmp_path):
     finish(window, controller)
     state = controller.state
     assert state.layout is Layout.FIT and state.fit.values == () and state.fit.lasting is None
-    assert state.fit.volume_cm3 == pytest.approx(egg(6.0, 1.0).volume / 1000, rel=TOLERATED)
+    assert state.fit.extent == pytest.approx(egg(6.0, 1.0).volume / 1000, rel=TOLERATED)
     assert controller.shown[FULL_SHAPE].request.person == state.person > 0
     assert not window.patients.compare.isVisible()
     window.covariates.reset_all_requested.emit()
@@ -105,13 +105,13 @@ def test_covariates_that_are_not_told_apart_have_sliders_and_one_shape(with_cova
     assert window.covariates.rows["sex"].reset.toolTip() == f"Back to {goal}"
     average = egg(dict(controller.state.named)["age"], sex).volume / 1000
     assert controller.shown[FULL_SHAPE].is_exact
-    assert controller.shown[FULL_SHAPE].volume_cm3 == pytest.approx(average, rel=TOLERATED)
+    assert controller.shown[FULL_SHAPE].extent == pytest.approx(average, rel=TOLERATED)
     window.covariates.value_moved.emit("age", 8.0)
     window.covariates.value_settled.emit("age", 8.0)
     window.covariates.value_settled.emit("sex", 1.0)
     finish(window, controller)
     shown = controller.shown[FULL_SHAPE]
-    assert shown.is_exact and shown.volume_cm3 == pytest.approx(egg(8.0, 1.0).volume / 1000, rel=TOLERATED)
+    assert shown.is_exact and shown.extent == pytest.approx(egg(8.0, 1.0).volume / 1000, rel=TOLERATED)
 
 
 def test_a_scan_is_fitted_and_seen_on_another_day(with_covariates, tmp_path):
@@ -126,5 +126,5 @@ def test_a_scan_is_fitted_and_seen_on_another_day(with_covariates, tmp_path):
     finish(window, controller)
     later = controller.shown[FULL_SHAPE]
     assert later.request.person == controller.state.person > 0
-    assert later.volume_cm3 == pytest.approx(egg(7.2, 1.0).volume / 1000, rel=2 * TOLERATED)
+    assert later.extent == pytest.approx(egg(7.2, 1.0).volume / 1000, rel=2 * TOLERATED)
     assert window.error_text.text() == ""

@@ -30,7 +30,7 @@ KNOWN = (("age", 6.0), ("sex", 1.0))
 def test_a_scan_is_read_as_it_is(desk):
     scan = desk[2].shown.scan
     assert scan.source.startswith("s25.stl") and not scan.blocked
-    assert scan.volume_cm3 == pytest.approx(egg(6.0, 1.0).volume / 1000, rel=1e-6)
+    assert scan.extent == pytest.approx(egg(6.0, 1.0).volume / 1000, rel=1e-6)
     assert scan.normals.shape == scan.points_mm.shape
 
 
@@ -39,8 +39,8 @@ def test_the_fit_is_that_of_python(desk, egg_atlas, file):
     assert dict(fit.values) == pytest.approx(expected.covariates) and fit.intervals == ()
     assert fit.residual_mm == pytest.approx(expected.residual_mm, rel=0.1)
     low, high = expected.volume_interval_cm3
-    assert fit.volume_cm3 == pytest.approx(expected.volume_cm3, rel=1e-3)
-    assert fit.volume_margin_cm3 == pytest.approx((high - low) / 2, rel=0.05)
+    assert fit.extent == pytest.approx(expected.extent, rel=1e-3)
+    assert fit.extent_margin == pytest.approx((high - low) / 2, rel=0.05)
 
 
 def test_elsewhere_only_what_lasts_of_a_patient_is_shown(egg_atlas, tmp_path, monkeypatch):
@@ -59,9 +59,9 @@ def test_elsewhere_only_what_lasts_of_a_patient_is_shown(egg_atlas, tmp_path, mo
     values = dict(elsewhere.named)
     kept, whole = (atlas.shape(values, share * person.latent).volume / 1000 for share in (1, 1 / 0.3))
     shown = engine.surface(request_for(elsewhere, FULL_SHAPE, 128))
-    assert shown.volume_cm3 == pytest.approx(kept, rel=2e-3) and abs(whole / kept - 1) > 5e-3
+    assert shown.extent == pytest.approx(kept, rel=2e-3) and abs(whole / kept - 1) > 5e-3
     low, high = person.volume_interval_cm3
-    assert shown.volume_margin_cm3 == pytest.approx((high - low) / 2, rel=0.05)
+    assert shown.extent_margin == pytest.approx((high - low) / 2, rel=0.05)
     colouring = engine.surface(request_for(elsewhere, SCAN, 128)).colouring
     assert colouring is not None
     off_mm, whole_off_mm = (
@@ -80,7 +80,7 @@ def test_two_patients_can_be_compared(desk, egg_atlas, tmp_path):
     fit, _ = clinic.fit(egg_atlas, scan, (("age", 3.0), ("sex", 1.0)))
     both = with_patient(state, OpenScan(2, other.name, reading, scan, (), fit))
     change = engine.surface(request_for(replace(both, compared=1), CHANGE, 128))
-    assert change.volume_before_cm3 == pytest.approx(state.fit.volume_cm3)
+    assert change.extent_before == pytest.approx(state.fit.extent)
     assert change.colouring.values[np.abs(change.normals[:, 2]) > 0.98].mean() < -4
     clinic.forget(fit)
 
@@ -90,7 +90,7 @@ def test_nobody_else_sees_a_patients_code(desk, egg_atlas):
     average = replace(state, patient=None)
     mine = engine.surface(request_for(state, FULL_SHAPE, 128))
     theirs = engine.surface(request_for(average, FULL_SHAPE, 128))
-    assert mine.points_mm is not theirs.points_mm and theirs.volume_margin_cm3 is None
+    assert mine.points_mm is not theirs.points_mm and theirs.extent_margin is None
     expected = Atlas.load(egg_atlas).shape(dict(state.named))
     np.testing.assert_allclose(theirs.points_mm, expected.vertices, atol=1e-3)
 

@@ -84,8 +84,8 @@ def test_a_patient_is_seen_on_the_own_line(known):
     found = answer.find("volume")
     assert found.sighting is not None
     assert found.sighting.place == 6.0
-    assert found.sighting.value == pytest.approx(state.fit.volume_cm3, rel=2e-3)
-    assert found.sighting.margin == pytest.approx(state.fit.volume_margin_cm3, rel=0.15)
+    assert found.sighting.value == pytest.approx(state.fit.extent, rel=2e-3)
+    assert found.sighting.margin == pytest.approx(state.fit.extent_margin, rel=0.15)
     assert readout(answer, found, 6.0).own == pytest.approx(found.sighting.value, rel=5e-3)
 
 
@@ -124,7 +124,7 @@ def test_a_patient_stands_among_people_of_the_same_covariates(known):
     engine, state = known
     volume, area = standings(engine, state.atlas.path, state.fit.person)
     assert (volume.title, volume.unit, area.unit) == ("Volume", "cm³", "cm²")
-    assert volume.value == pytest.approx(state.fit.volume_cm3, rel=2e-3)
+    assert volume.value == pytest.approx(state.fit.extent, rel=2e-3)
     norm = engine.norms(state.atlas.path).norms(dict(state.fit.values), {"volume": volume.value})["volume"]
     assert (volume.percentile, volume.z) == (norm.percentile, norm.z)
 

@@ -11,7 +11,6 @@ import trimesh
 
 from naisr_model.atlas import Atlas
 from naisr_model.errors import Cancelled, InputError
-from naisr_model.frames import Frame
 from naisr_model.progress import Progress
 from naisr_viewer.engine import cache
 from naisr_viewer.engine.engine import CACHED_SURFACES, Engine
@@ -39,7 +38,7 @@ def test_surfaces_have_the_true_volume(engine, card, atlas):
     ]
     for panel, values in cases:
         result = engine.surface(SurfaceRequest(card.path, panel, tuple(values.items()), 128))
-        assert result.volume_cm3 == pytest.approx(atlas.volume_cm3(**values), rel=0.01)
+        assert result.extent == pytest.approx(atlas.volume_cm3(**values), rel=0.01)
         assert result.is_exact
 
 
@@ -102,18 +101,12 @@ def test_no_surface_is_an_answer_too(engine, card, atlas, monkeypatch):
     result = engine.surface(ask(card.path))
     assert result.faces.shape == (0, 3)
     assert result.points_mm.shape == (0, 3)
-    assert result.volume_cm3 == 0.0
+    assert result.extent == 0.0
 
 
 def test_a_missing_file_is_named(engine, tmp_path):
     with pytest.raises(InputError, match="nowhere"):
         engine.open(tmp_path / "nowhere.safetensors")
-
-
-def test_an_atlas_of_curves_is_refused_in_words(atlas, atlas_file):
-    atlas.frame = Frame((0.0, 0.0), 1.0)
-    with pytest.raises(InputError, match="an atlas of curves in the plane"):
-        Engine(lambda _: atlas).open(atlas_file)
 
 
 def tabulations(atlas) -> int:
@@ -131,7 +124,7 @@ def test_previews_carry_the_template_once_displacements_are_tabulated(engine, ca
     assert atlas.calls == []
     assert first.faces is second.faces
     np.testing.assert_array_equal(first.faces, template.faces)
-    assert first.volume_cm3 == pytest.approx(atlas.volume_cm3(age=150.0, weight=50.0), rel=0.01)
+    assert first.extent == pytest.approx(atlas.volume_cm3(age=150.0, weight=50.0), rel=0.01)
     assert not first.is_exact
     assert first.origin is Origin.TABLES
 
@@ -224,7 +217,7 @@ def test_the_second_start_shows_the_template_without_the_networks(engine, card, 
         for kept, made in [(shown.points_mm, first.points_mm), (shown.normals, first.normals)]:
             np.testing.assert_array_equal(kept, made, strict=True)
         np.testing.assert_array_equal(shown.faces, first.faces, strict=True)
-        assert shown.volume_cm3 == first.volume_cm3
+        assert shown.extent == first.extent
     assert again.was_kept(card.path) and not engine.was_kept(card.path)
     assert loader.count == 0
 
@@ -235,7 +228,7 @@ def test_the_networks_are_loaded_once_and_when_they_are_needed(engine, card, atl
     again = Engine(loader, tmp_path / "cache")
     again.open(card.path)
     moved = again.surface(ask(card.path, age=150.0))
-    assert moved.volume_cm3 == pytest.approx(atlas.volume_cm3(age=150.0), rel=0.01)
+    assert moved.extent == pytest.approx(atlas.volume_cm3(age=150.0), rel=0.01)
     again.prepare_previews(card.path)
     assert again.has_previews(card.path)
     assert loader.count == 1

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from naisr_model.errors import InputError
+from naisr_model.frames import Frame
 from naisr_viewer.engine.ledgers import ledger, origin_mm
 from naisr_viewer.panels.kinds import request_for, visible_panels
 from naisr_viewer.panels.pins import can_pin, ledger_request
@@ -97,7 +98,7 @@ def test_how_sure_a_bar_is_stands_beside_it_once_its_people_are_known(clicked, t
 
 def test_what_is_less_than_its_interval_is_not_told_from_nothing():
     entry = Entry(PIN, (Part("age", 2.314, 0.0, 0.12),), None, Part("", -0.1, 0.04, 0.3))
-    assert words.told(entry) == (
+    assert words.told(entry, "mm") == (
         "Place 1\nAge: +2.31 ± 0.12 mm, 0.00 mm along it\n"
         "Together: −0.10 ± 0.30 mm, not told from nothing, 0.04 mm along it"
     )
@@ -130,6 +131,7 @@ class Folding:
     """An atlas that moves all by 1 mm, and folds beyond x = 50 mm."""
 
     checkpoint = SimpleNamespace(latents=np.zeros((1, 2)))
+    frame = Frame((0.0, 0.0, 0.0), 1.0)
     population = SimpleNamespace(names=("age",))
 
     def carried_mm(self, origins_mm, covariates, latents):

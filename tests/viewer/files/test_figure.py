@@ -13,15 +13,16 @@ import trimesh
 
 from naisr_model.errors import Cancelled
 from naisr_model.progress import Progress
+from naisr_model.shapes.curve import closed
 from naisr_viewer.control.jobs import ExportReport, exporting_matrix
-from naisr_viewer.files.figure import CELL_IN, DOTS_PER_INCH, as_seen, shape_image
+from naisr_viewer.files.figure import CELL_IN, DOTS_PER_INCH, OUTLINE_PT, as_seen, shape_image
 from naisr_viewer.files.matrix import planned_matrix
 from naisr_viewer.panels.kinds import request_for, visible_panels
 from naisr_viewer.state.camera import FROM_THE_FRONT, Camera
 from naisr_viewer.state.explorer import ExplorerState, opened
-from naisr_viewer.state.layouts import Layout
+from naisr_viewer.state.layouts import FULL_SHAPE, Layout
 from naisr_viewer.state.matrix import Matrix, side_of
-from naisr_viewer.state.requests import ExportChoice
+from naisr_viewer.state.requests import ExportChoice, Origin, SurfaceRequest, SurfaceResult
 from naisr_viewer.views.colours import printed_colours
 
 ABOVE = Camera((5.0, 5.0, 90.0), (5.0, 5.0, 0.0), (0.0, -1.0, 0.0), (1.0, 1.0))
@@ -43,6 +44,29 @@ def test_right_up_and_towards_the_eye():
     axes = np.eye(3)
     np.testing.assert_allclose(as_seen(axes, FROM_THE_FRONT), [[1, 0, 0], [0, 0, -1], [0, 1, 0]], atol=1e-12)
     np.testing.assert_allclose(as_seen(axes, ABOVE), [[-1, 0, 0], [0, -1, 0], [0, 0, 1]], atol=1e-12)
+
+
+def test_what_a_curve_encloses_is_filled_without_its_holes():
+    angles = np.linspace(0, 2 * np.pi, 200, endpoint=False)
+    circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    ring = closed([40 * circle, 20 * circle])
+    request = SurfaceRequest(Path("a"), FULL_SHAPE, (), 128)
+    shape = SurfaceResult(
+        request,
+        ring.vertices.astype(np.float32),
+        ring.vertex_normals.astype(np.float32),
+        ring.faces,
+        ring.volume,
+        0.0,
+        Origin.NETWORK,
+    )
+    image = shape_image(shape, "#4080c0", FROM_THE_FRONT, (-60.0, 60.0, -60.0, 60.0)).astype(float)
+    mm_a_dot = 120 / image.shape[0]
+    covered = image[..., 3].sum() / 255 * mm_a_dot**2
+    line_mm = OUTLINE_PT / 72 / CELL_IN * 120  # half of it lies outside, on both sides of the ring
+    assert covered == pytest.approx(np.pi * (40**2 - 20**2) + np.pi * (40 + 20) * line_mm, rel=0.01)
+    middle, flesh = image[image.shape[0] // 2, [image.shape[1] // 2, round(0.75 * image.shape[1])]]
+    assert middle[3] == 0 and flesh[:3].round().tolist() == [0x40, 0x80, 0xC0]
 
 
 @pytest.mark.parametrize(("camera", "half_axes"), [(FROM_THE_FRONT, (0, 2)), (ABOVE, (0, 1))])

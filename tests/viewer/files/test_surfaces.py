@@ -69,7 +69,7 @@ def test_the_record_says_what_the_file_shows(result, card, tmp_path):
     assert record["view"] == "Full shape"
     assert record["covariates"]["age"] == {"value": 150.0, "unit": "months"}
     assert record["covariates"]["sex"]["reading"] == "M"
-    assert record["volume_cm3"] == pytest.approx(result.volume_cm3, abs=1e-3)
+    assert record["volume_cm3"] == pytest.approx(result.extent, abs=1e-3)
     assert record["length_unit"] == "mm"
     assert record["program"] == f"naisr-viewer {__version__}"
 
@@ -132,9 +132,7 @@ def test_a_change_records_what_it_is_counted_from(result, card):
 
 @pytest.mark.parametrize("ending", FORMATS)
 def test_a_cloud_of_points_goes_where_points_can_be(result, card, tmp_path, ending):
-    cloud = replace(
-        coloured(result), faces=np.zeros((0, 3), np.int64), volume_cm3=0.0, origin=Origin.MEASURED
-    )
+    cloud = replace(coloured(result), faces=np.zeros((0, 3), np.int64), extent=0.0, origin=Origin.MEASURED)
     path = tmp_path / f"scan.{ending}"
     if ending not in ("ply", "vtp"):
         with pytest.raises(InputError, match="export it as ply or vtp"):

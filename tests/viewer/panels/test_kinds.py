@@ -67,7 +67,7 @@ def test_a_scan_is_called_what_it_is(engine, card):
         1, "p", Reading(Path("p")), Scan(CORNERS, CORNERS, np.zeros((0, 3), int), "p, 3 points")
     )
     triangle = replace(patient, scan=replace(patient.scan, faces=np.array([[0, 1, 2]])))
-    closed = replace(patient, scan=replace(triangle.scan, volume_cm3=41.5))
+    closed = replace(patient, scan=replace(triangle.scan, extent=41.5))
     surface, start = engine.surface(ask(card)), opened(ExplorerState(), card)
     told = [
         KINDS["scan"].caption(with_patient(start, each), surface).text for each in (patient, triangle, closed)

@@ -43,7 +43,7 @@ def test_cells_show_the_template_the_effects_and_the_full_shape_at_their_covaria
     for resolution in (40, 128):
         for cell, values in told.items():
             surface = engine.surface(request_for(state, at(*cell), resolution))
-            assert surface.volume_cm3 == pytest.approx(atlas.volume_cm3(**values), rel=0.01)
+            assert surface.extent == pytest.approx(atlas.volume_cm3(**values), rel=0.01)
             assert surface.request.panel == at(*cell)
 
 

@@ -127,4 +127,4 @@ def test_what_is_muted_moves_the_full_shape_no_more(ready, atlas):
 
 
 def volume(controller) -> float:
-    return float(controller.shown[FULL_SHAPE].volume_cm3)
+    return float(controller.shown[FULL_SHAPE].extent)

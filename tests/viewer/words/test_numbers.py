@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from naisr_model.covariates import Covariate
+from naisr_model.frames import Frame
 from naisr_viewer.words.numbers import (
     duration,
     gained,
+    in_unit,
     interval_reading,
     length,
     reading,
     volume,
+    way,
 )
 
 
@@ -23,6 +26,16 @@ def test_figures_have_digits_that_mean_something():
     assert gained(48.3, 61.0) == "−12.7 cm³ (−21\u00a0%)"
     assert gained(33.91, 33.2) == "+0.71 cm³ (+2.1\u00a0%)"
     assert gained(33.46, 33.3, 0.51) == "+0.16 cm³ (+0.5\u00a0%)"
+
+
+def test_areas_and_lengths_of_no_known_unit_have_digits_that_count():
+    area = Frame((0.0, 0.0), 2.0, "units").extent
+    assert volume(1.44698, None, area) == "1.447 units²"
+    assert volume(1.44698, 0.0123, area) == "1.447 ± 0.012 units²"
+    assert gained(1.5, 1.4, None, area) == "+0.100 units² (+7.1\u00a0%)"
+    assert length(0.01234, "units") == "0.0123 units"
+    assert way(-0.5, "px") == "−0.500 px" and way(0.0, "px") == "0 px"
+    assert in_unit("in mm, not in mmHg", "px") == "in px, not in mmHg"
 
 
 def test_digits_suit_the_range():

@@ -64,7 +64,7 @@ def test_the_difference_of_the_scans_is_seen_and_told(both, meshes):
     far = np.abs(result.points_mm[:, 2] - 8.0) > 12.0
     assert np.abs(result.colouring.values[far]).max() < 0.05
     plain, wide = (mesh.volume / 1000 for mesh in meshes)
-    assert result.volume_cm3 - result.volume_before_cm3 == pytest.approx(wide - plain, rel=0.05)
+    assert result.extent - result.extent_before == pytest.approx(wide - plain, rel=0.05)
     assert f"+{wide - plain:.1f} cm³" in caption_of(state, result).text
 
 

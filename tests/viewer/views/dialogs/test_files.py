@@ -31,7 +31,7 @@ def test_every_ending_that_the_model_reads_can_be_chosen(parent, monkeypatch):
         return "/scans/p01.stl", filters
 
     monkeypatch.setattr(QFileDialog, "getOpenFileName", answer)
-    assert ask_scan_path(parent) == Path("/scans/p01.stl")
+    assert ask_scan_path(parent, None) == Path("/scans/p01.stl")
     assert all(f"*{ending}" in offered[0] for ending in readable)
 
 

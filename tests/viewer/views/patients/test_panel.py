@@ -41,14 +41,14 @@ FIT = Fitted(
     person=1,
     values=(("age", 84.0), ("weight", 21.43), ("sex", 1.0)),
     intervals=(("weight", 18.23, 24.91), ("sex", -1.0, 1.0)),
-    volume_cm3=48.31,
-    volume_margin_cm3=2.13,
+    extent=48.31,
+    extent_margin=2.13,
     residual_mm=0.312,
     lasting=0.36,
     seconds=2.31,
     remarks=("the shape does not tell sex: both levels explain it",),
 )
-ONE = OpenScan(1, "p01.stl", Reading(Path("/scans/p01.stl")), scan(volume_cm3=46.21))
+ONE = OpenScan(1, "p01.stl", Reading(Path("/scans/p01.stl")), scan(extent=46.21))
 TWO = OpenScan(2, "p02.ply", Reading(Path("/scans/p02.ply")), scan(source="p02.ply, 800 faces"))
 
 
@@ -127,7 +127,7 @@ def write(box: NumberField, text: str) -> None:
 
 
 def test_without_patients_it_invites_to_open_one(panel, heard):
-    assert pp.INVITATION in words(panel)
+    assert "Open a scan to fit the atlas to it: a mesh, a label volume or a cloud of points." in words(panel)
     for part in (panel.list, panel.scan, panel.alignment, panel.known, panel.result, panel.compare):
         assert not part.isVisible()
     click(panel.open)
@@ -460,9 +460,7 @@ def test_the_result_tells_values_and_how_sure_they_are(panel, start):
     for word in ("48.3 ± 2.1 cm³ (95\u00a0%)", "0.31 mm", "2.3 s"):
         assert word in said
     assert "The shape does not tell sex: both levels explain it" in said
-    panel.show_state(
-        with_patient(start, replace(ONE, fit=replace(FIT, person=2, volume_cm3=50.0, remarks=())))
-    )
+    panel.show_state(with_patient(start, replace(ONE, fit=replace(FIT, person=2, extent=50.0, remarks=()))))
     assert "50.0 ± 2.1 cm³ (95\u00a0%)" in words(panel.result)
     assert "does not tell" not in words(panel.result)
 
