@@ -153,7 +153,7 @@ def _fits(journal: Path) -> int:
 def test_only_what_was_corrected_is_fitted_again(cohort, egg_atlas, cohort_table, out):
     before = (out / "journal.jsonl").read_text().splitlines()
     corrected = cohort_table.with_name("corrected.csv")
-    corrected.write_text(cohort_table.read_text().replace(",old,", ",4,"))
+    corrected.write_text(cohort_table.read_text().replace(",old,F,", ",6,M,"))
     found = fit_cohort(corrected, egg_atlas, out, workers=1)
     after = (out / "journal.jsonl").read_text().splitlines()
     assert after[: len(before)] == before and len(after) == len(before) + 1
