@@ -46,6 +46,12 @@ def fit(
         ),
     ] = None,
     workers: Annotated[int | None, Parameter(help="processes; left out, one a core.")] = None,
+    cluster: Annotated[
+        str | None,
+        Parameter(
+            help="address of a dask scheduler whose workers share the work, as tcp://node17:8786, or local:4."
+        ),
+    ] = None,
 ) -> None:
     """Fit an atlas to every scan that a table names; one that was stopped goes on where it was.
 
@@ -62,7 +68,7 @@ def fit(
     for line in read_cohort(table, opened(atlas).covariates).summary:
         print(line, flush=True)
     with bar("fitting") as progress:
-        found = fit_cohort(table, atlas, out, options, workers=workers, progress=progress)
+        found = fit_cohort(table, atlas, out, options, workers=workers, cluster=cluster, progress=progress)
     for one in found.rejected:
         print(f"{WORDS['refuse']} row {one.row.number} ({one.row.subject}, {one.row.visit}): {one.reason}")
     if found.without:

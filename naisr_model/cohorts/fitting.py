@@ -11,8 +11,9 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Collection, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import asdict
-from functools import lru_cache, partial
+from functools import partial
 from pathlib import Path
 
 from naisr_model.atlas import Atlas
@@ -23,12 +24,14 @@ from naisr_model.cohorts.table import CohortRow, read_cohort
 from naisr_model.errors import InputError
 from naisr_model.evaluation.held_out import opened
 from naisr_model.evaluation.journal import Keep, Record, keeping, plain
-from naisr_model.files import sha256_of, sources_digest, stamp_of, write_all
+from naisr_model.files import sha256_of, stamp_of, write_all
 from naisr_model.measures.kept import load_norms, save_norms
 from naisr_model.measures.kinds import MEASURES
 from naisr_model.measures.norms import Norms, norms_of
 from naisr_model.progress import SILENT, Progress
-from naisr_model.work.run import processes
+from naisr_model.work.cluster import cluster as over_cluster
+from naisr_model.work.cluster import program
+from naisr_model.work.run import Run, processes
 
 JOURNAL, CSV, PARQUET, PAGE = "journal.jsonl", "results.csv", "results.parquet", "report.html"
 
@@ -43,6 +46,7 @@ def fit_cohort(
     options: CohortOptions | None = None,
     *,
     workers: int | None = None,
+    cluster: str | None = None,
     progress: Progress = SILENT,
 ) -> Cohort:
     """Fit an atlas to every scan that a table names, and write what was found into a folder.
@@ -56,12 +60,16 @@ def fit_cohort(
         out: folder of ``results.csv``, ``results.parquet``, ``report.html`` and the journal.
         options: how scans are read, and what is measured of them.
         workers: processes; None for one a core. The results are the same for any number.
+        cluster: of dask workers that share the work in their place, see :mod:`~naisr_model.work.cluster`.
         progress: told the finished share.
 
     Raises:
         InputError: when the table or the atlas cannot be used, or the folder holds something else.
         Cancelled: when nobody waits any more.
     """
+    if cluster is not None and workers is not None:
+        raise InputError("--workers are processes on this machine, --cluster has its own; give one of them")
+    table, atlas, out = table.absolute(), atlas.absolute(), out.absolute()
     options = options or CohortOptions()
     model, stamp = opened(atlas), stamp_of(atlas)
     require_measures(options.measures, model)
@@ -69,7 +77,7 @@ def fit_cohort(
     require_distinct(read, model)
     _require_own(out)
     digest = sha256_of(atlas)
-    identity = plain({"program": _program(), "atlas": digest, **asdict(options)})
+    identity = plain({"program": program(), "atlas": digest, **asdict(options)})
     with keeping(out / JOURNAL, identity) as (kept, keep):
         norms_file = out / f"norms-{digest[:12]}.safetensors"
         usual, why = _norms(model, norms_file, progress.part(0.0, KNOWING))
@@ -82,7 +90,9 @@ def fit_cohort(
 
         keys = [_key(row) for row in read.rows]
         rows = dict(zip(keys, read.rows, strict=True))
-        found = _found(rows, kept, add, bench, workers, progress.part(KNOWING, TELLING))
+        share = processes(workers) if cluster is None else over_cluster(cluster)
+        is_here = cluster is None and workers == 1
+        found = _found(rows, kept, add, bench, share, is_here, progress.part(KNOWING, TELLING))
         outcomes = tuple(Outcome(row, found[key]) for key, row in zip(keys, read.rows, strict=True))
         cohort = Cohort(read, outcomes, model, usual, why)
         write_all(
@@ -109,16 +119,17 @@ def _found(
     kept: Mapping[str, Record],
     keep: Keep,
     bench: Bench,
-    workers: int | None,
+    share: AbstractContextManager[Run],
+    is_here: bool,
     progress: Progress,
 ) -> dict[str, Record]:
-    """The record of every row: those that are kept, and those that are left to be fitted."""
+    """The record of every row: those that are kept, and those that ``share`` is left to fit."""
     missing = [key for key in rows if key not in kept]
     left = progress.part(1 - len(missing) / len(rows), 1.0)
     # Whether anybody waits cannot be asked from other processes: there a row goes with its process.
-    fit = partial(fit_row, bench, progress=left.quiet) if workers == 1 else partial(fit_row, bench)
+    fit = partial(fit_row, bench, progress=left.quiet) if is_here else partial(fit_row, bench)
     found = {key: kept[key] for key in rows if key in kept}
-    with processes(workers) as run:
+    with share as run:
         for number, record in run(fit, [rows[key] for key in missing], left):
             keep(missing[number], record)
             found[missing[number]] = record
@@ -153,9 +164,3 @@ def _require_own(out: Path) -> None:
         return
     if others := [name for name in (CSV, PARQUET, PAGE) if (out / name).exists()]:
         raise InputError(f"{out} holds {others[0]} of something else; give another folder")
-
-
-@lru_cache(maxsize=1)
-def _program() -> str:
-    """Digest of the code that fits and measures."""
-    return sources_digest(Path(__file__).parents[1]).hex()

@@ -22,6 +22,7 @@ from naisr_model.atlas import Atlas
 from naisr_model.cohorts.fitting import fit_cohort
 from naisr_model.cohorts.results import Cohort, as_csv
 from naisr_model.errors import InputError
+from naisr_model.progress import Progress
 
 REJECTED = {
     5: "nowhere.stl does not exist",
@@ -146,6 +147,28 @@ def test_a_run_that_was_killed_goes_on_to_the_same_table(cohort, egg_atlas, coho
     assert _fits(journal) == 4
 
 
+def test_a_cluster_that_loses_a_worker_gives_the_same_table(cohort, egg_atlas, cohort_table, tmp_path):
+    pytest.importorskip("distributed", reason="the extra 'cluster' is not installed")
+    import psutil
+
+    killed: list[psutil.Process] = []
+
+    def kill_one(_share: float) -> None:
+        if not killed and (tmp_path / "journal.jsonl").exists() and _fits(tmp_path / "journal.jsonl"):
+            workers = [
+                each
+                for each in psutil.Process().children()
+                if any("spawn_main" in word for word in each.cmdline())
+            ]
+            assert len(workers) == 2
+            workers[0].kill()
+            killed.append(workers[0])
+
+    found = fit_cohort(cohort_table, egg_atlas, tmp_path, cluster="local:2", progress=Progress(kill_one))
+    assert killed and untimed(as_csv(found)) == untimed(as_csv(cohort))
+    assert _fits(tmp_path / "journal.jsonl") == 4
+
+
 def _fits(journal: Path) -> int:
     return journal.read_bytes().count(b'"latent"')
 
@@ -165,6 +188,10 @@ def test_only_what_was_corrected_is_fitted_again(cohort, egg_atlas, cohort_table
     ("words", "message"),
     [
         (["--measure", "girth"], "there is no measure 'girth'; give volume, area, length, narrowest"),
+        (
+            ["--workers", "2", "--cluster", "local:2"],
+            "--workers are processes on this machine, --cluster has",
+        ),
         (["--workers", "0"], "the number of workers is 0"),
         (["--align", "icp"], "keeps a run with another align; name another journal"),
     ],
