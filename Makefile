@@ -110,7 +110,7 @@ lock: ## write requirements.lock anew from the ranges in pyproject.toml; torch s
 	@fresh="$$(mktemp -d)"; trap 'rm -rf "$$fresh"' EXIT; set -e; \
 	$(PYTHON) -m venv "$$fresh"; \
 	"$$fresh/bin/python" -m pip install --quiet $(TORCH_ARGS) "$$(grep '^torch==' requirements.lock)"; \
-	"$$fresh/bin/python" -m pip install --quiet $(PIP_ARGS) '.[test,bodies]'; \
+	"$$fresh/bin/python" -m pip install --quiet $(PIP_ARGS) '.[test,bodies,cluster]'; \
 	{ sed -n '/^#/p' requirements.lock; \
 	  "$$fresh/bin/python" -m pip freeze --all --exclude pip --exclude naisr-atlas-explorer | \
 	    sed -e '/^\(nvidia\|cuda\|triton\)/d' -e 's/+[a-z0-9]*$$//'; \

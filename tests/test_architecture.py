@@ -33,6 +33,7 @@ FLOORS = {
         ("measures",),
         ("patients",),
         ("evaluation",),
+        ("cohorts",),
         ("benchmark",),
         ("cli",),
     ),

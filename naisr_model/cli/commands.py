@@ -5,7 +5,7 @@ from __future__ import annotations
 from cyclopts import App, Parameter
 
 from naisr_model import __version__
-from naisr_model.cli import atlases, benchmarking, data, patients
+from naisr_model.cli import atlases, benchmarking, cohorts, data, patients
 from naisr_model.cli.options import converted
 
 COMMANDS = (
@@ -28,6 +28,7 @@ app = App(
 )
 for _command in COMMANDS:
     app.command(_command)
+app.command(cohorts.cohort)
 # What these offer comes from the models and the studies, which load torch; so only when they are asked for.
 app.command(
     "naisr_model.cli.training:train",

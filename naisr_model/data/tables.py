@@ -127,7 +127,7 @@ def read_table(path: str | Path, accepted: Collection[int] = ()) -> ShapeTable:
     """
     path = Path(path)
     sheet = read_sheet(path)
-    titles = _titles(path, sheet)
+    titles = titles_of(path, sheet)
     extra = _read_toml(path.with_suffix(".toml"))
     names = [name for name in titles if name not in RESERVED]
     if not names:
@@ -177,8 +177,12 @@ def _one_subject(rows: Sequence[TableRow]) -> tuple[Remark, ...]:
     return (Remark("look", "subjects", sentence, "look whether the column 'subject' is right"),)
 
 
-def _titles(path: Path, sheet: Sheet) -> dict[str, tuple[str, str]]:
-    """Title and unit of each column by its name; those that are :data:`RESERVED` in small letters."""
+def titles_of(path: Path, sheet: Sheet) -> dict[str, tuple[str, str]]:
+    """Title and unit of each column by its name; those that are :data:`RESERVED` in small letters.
+
+    Raises:
+        InputError: when two names differ in their letters only, there is no column of subjects, or no row.
+    """
     named: dict[str, tuple[str, str]] = {}
     for title in sheet.titles:
         name, unit = split_title(title)
@@ -262,10 +266,10 @@ def _rows(
         rows.append(
             TableRow(
                 number=line.number,
-                mesh=_located(path.parent, cells.get("mesh", "")),
+                mesh=located(path.parent, cells.get("mesh", "")),
                 subject=cells["subject"],
                 visit=cells.get("visit", str(seen[cells["subject"]])),
-                landmarks=None if is_missing(marks) else _located(path.parent, marks),
+                landmarks=None if is_missing(marks) else located(path.parent, marks),
             )
         )
     if not faults:
@@ -288,14 +292,14 @@ def _refuse_repeated(path: Path, rows: Sequence[TableRow]) -> None:
     )
 
 
-def _located(folder: Path, text: str) -> Path:
+def located(folder: Path, text: str) -> Path:
     """The file that a cell names, also by ``~/``, by a ``file://`` address or with backslashes."""
     if text.lower().startswith("file:"):
         text = unquote(urlparse(text).path)
     written = folder / (os.path.expanduser(text) if text.startswith(("~/", "~\\")) else text)
     if "\\" not in text or os.path.exists(written):
         return written
-    return _located(folder, PureWindowsPath(text).as_posix())
+    return located(folder, PureWindowsPath(text).as_posix())
 
 
 def require_file(path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What an evaluation has measured so far, one line of JSON a case, so that a run that was killed goes on.
+"""What a run has measured so far, one line of JSON a case, so that a run that was killed goes on.
 
 The first line says of what the journal is; every other one is a case. A line counts once it is complete, so
 the half of one that a killed run leaves is forgotten, and its case is measured again. One run keeps a journal
@@ -107,7 +107,7 @@ def _parsed(path: Path, line: bytes) -> Record:
 
 
 def _no_journal(path: Path) -> InputError:
-    return InputError(f"{path} is no journal of an evaluation; name another file")
+    return InputError(f"{path} is no journal; name another file")
 
 
 def _other(found: Record, expected: Record) -> str:
@@ -115,4 +115,4 @@ def _other(found: Record, expected: Record) -> str:
     if found.keys() != expected.keys():
         return "something else"
     names = [name for name in expected if found[name] != expected[name]]
-    return f"an evaluation with another {' and another '.join(names)}"
+    return f"a run with another {' and another '.join(names)}"

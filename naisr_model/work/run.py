@@ -120,7 +120,7 @@ def _run_in(
     progress: Progress = SILENT,
 ) -> Iterator[tuple[int, Result]]:
     try:
-        with _held_back():
+        with held_back():
             numbers = {pool.submit(function, job): number for number, job in enumerate(jobs)}
         pending = set(numbers)
         while pending:
@@ -147,7 +147,7 @@ def _run_in(
 
 
 @contextmanager
-def _held_back() -> Iterator[None]:
+def held_back() -> Iterator[None]:
     """Ctrl+C waits meanwhile, and for good in processes started here: it would kill them on their way."""
     if not hasattr(signal, "pthread_sigmask"):
         yield

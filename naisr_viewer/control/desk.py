@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import count
@@ -11,15 +12,26 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject
 
+from naisr_model.errors import InputError
 from naisr_model.files import Stamp, stamp_of
 from naisr_viewer.control import jobs
 from naisr_viewer.control.controller import Controller
 from naisr_viewer.control.watch import FileWatch
 from naisr_viewer.engine.clinic import Clinic
-from naisr_viewer.state.explorer import showing, with_patient, without_patient
+from naisr_viewer.state.explorer import (
+    showing,
+    stated_of,
+    unfitted,
+    with_changed,
+    with_patient,
+    with_stated,
+    without_patient,
+)
 from naisr_viewer.state.layouts import Layout
-from naisr_viewer.state.patients import Fitted, Labels, Named, OpenScan, Reading, Scan
+from naisr_viewer.state.patients import Fitted, Labels, Named, OpenScan, Reading, Scan, Stated
 from naisr_viewer.views.main_window import MainWindow
+from naisr_viewer.words.numbers import in_words
+from naisr_viewer.words.patients import doubt
 from naisr_viewer.words.titles import label
 
 
@@ -52,6 +64,7 @@ class PatientDesk(QObject):
         self._window, self._controller, self._clinic = window, controller, clinic
         self._keys = count(1)
         self._waiting: deque[Order] = deque()
+        self._failures: list[str] = []
         self._files = FileWatch(self)
         self._files.touched.connect(self._look_at_files)
         controller.refinement.settled.connect(self._read_next)
@@ -65,6 +78,8 @@ class PatientDesk(QObject):
         panel.reading_changed.connect(self.read_differently)
         panel.reread_requested.connect(self.read_again)
         panel.fit_requested.connect(self.fit)
+        panel.fit_all_requested.connect(self.fit_all)
+        panel.table_chosen.connect(self.take_known)
         panel.compared_chosen.connect(self.compare)
         panel.ghost_toggled.connect(self.set_ghost)
 
@@ -116,6 +131,28 @@ class PatientDesk(QObject):
             f"Fitting {patient.name} …", job, partial(self._show_fit, patient, known)
         )
 
+    def fit_all(self, known: Mapping[int, Named]) -> None:
+        """Fit the atlas to every open scan that has no fit, one after the other.
+
+        Args:
+            known: of each open scan, by its key.
+        """
+        atlas = self._controller.state.atlas
+        chosen = [(each, known[each.key]) for each in unfitted(self._controller.state)]
+        if atlas is None or any(self._is_refused(values, f"{each.name}: ") for each, values in chosen):
+            return
+        told = f"Fitting {len(chosen)} scans …"
+        self._failures = []
+        job = jobs.fitting_all(self._clinic, atlas.path, chosen)
+        self._controller.refinement.run(told, job, self._show_one_of_all)
+
+    def take_known(self, table: Path) -> None:
+        """Take what is known of the open scans from a table."""
+        atlas = self._controller.state.atlas
+        if atlas is not None:
+            job = jobs.reading_table(self._clinic, atlas.path, table)
+            self._controller.refinement.run(f"Reading {table.name} …", job, partial(self._show_stated, table))
+
     def compare(self, key: int | None) -> None:
         """Count changes from another patient; None for this patient as fitted."""
         self._controller.commit(replace(self._controller.state, compared=key))
@@ -124,8 +161,8 @@ class PatientDesk(QObject):
         """Whether the scan is drawn over the full shape."""
         self._controller.go(replace(self._controller.state, has_ghost=has_ghost))
 
-    def _is_refused(self, known: Named) -> bool:
-        """Whether a covariate is where the atlas knows nobody; says so."""
+    def _is_refused(self, known: Named, whose: str = "") -> bool:
+        """Whether a covariate is where the atlas knows nobody; says so, and first ``whose`` it is."""
         atlas = self._controller.state.atlas
         assert atlas is not None
         for name, value in known:
@@ -133,7 +170,7 @@ class PatientDesk(QObject):
             if not covariate.contains(value):
                 told = "no number" if math.isnan(value) else covariate.format(value)
                 self._window.show_error(
-                    f"{label(name)} is {told}; the atlas was made from {covariate.extent}. "
+                    f"{whose}{label(name)} is {told}; the atlas was made from {covariate.extent}. "
                     "Correct it, or untick it to have it inferred."
                 )
                 return True
@@ -174,14 +211,39 @@ class PatientDesk(QObject):
 
     def _show_fit(self, fitted: OpenScan, known: Named, found: tuple[Fitted, Scan]) -> None:
         """A fit that came to its end, unless its patient was closed or read differently meanwhile."""
+        if (placed := self._placed(fitted, known, found)) is not None:
+            state = with_patient(self._controller.state, placed)
+            layout = Layout.FIT if fitted.fit is None else state.layout
+            self._controller.commit(replace(state, layout=layout))
+
+    def _placed(self, fitted: OpenScan, known: Named, found: tuple[Fitted, Scan]) -> OpenScan | None:
+        """The patient with a fit; None where it has come too late."""
         (fit, scan), patient = found, self._controller.state.find(fitted.key)
         if patient is None or patient.scan is not fitted.scan:
             self._clinic.forget(fit)
-            return
-        placed = replace(patient, known=known, scan=scan, fit=fit)
-        state = with_patient(self._controller.state, placed)
-        layout = Layout.FIT if patient.fit is None else state.layout
-        self._controller.commit(replace(state, layout=layout))
+            return None
+        return replace(patient, known=known, scan=scan, fit=fit)
+
+    def _show_one_of_all(self, outcome: jobs.Outcome) -> None:
+        """One of several fits; who is shown stays until the own fit has come."""
+        patient, known, found = outcome
+        if isinstance(found, InputError):
+            self._failures.append(f"{patient.name}: {in_words(found)}")
+            self._window.show_error("\n".join(self._failures))
+        elif patient.key == self._controller.state.patient:
+            self._show_fit(patient, known, found)
+        elif (placed := self._placed(patient, known, found)) is not None:
+            self._controller.commit(with_changed(self._controller.state, placed))
+
+    def _show_stated(self, table: Path, stated: tuple[Stated, ...]) -> None:
+        """What a table says of the open scans, and of which it says nothing, or nothing that can be used."""
+        state = self._controller.state
+        if (new := with_stated(state, stated)).patients != state.patients:
+            self._controller.commit(new)
+        doubts = [told for each in state.patients if (told := doubt(each.name, stated_of(each, stated)))]
+        self._window.show_error("\n".join(f"{table.name}: {told}" for told in doubts))
+        count = len(state.patients) - len(doubts)
+        self._controller.refinement.tell(f"Known of {count} of {len(state.patients)} scans by {table.name}")
 
     def _new_key(self) -> int:
         """One that nobody has who is open; those of a session are not counted here."""

@@ -8,6 +8,7 @@ from itertools import chain
 from pathlib import Path
 from threading import Event
 
+from naisr_model.errors import InputError
 from naisr_model.exports import CURVE_FORMATS
 from naisr_model.files import write_all
 from naisr_model.progress import Progress
@@ -27,7 +28,7 @@ from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.curves import CurveRequest, Curves, Standing
 from naisr_viewer.state.explorer import ExplorerState
 from naisr_viewer.state.layouts import Panel
-from naisr_viewer.state.patients import Fitted, Labels, Named, Reading, Scan
+from naisr_viewer.state.patients import Fitted, Labels, Named, OpenScan, Reading, Scan, Stated
 from naisr_viewer.state.pins import Ledger, LedgerRequest, Point
 from naisr_viewer.state.requests import ExportChoice, SurfaceRequest, SurfaceResult
 from naisr_viewer.state.session import Session
@@ -131,6 +132,28 @@ def reading(clinic: Clinic, atlas: Path, wanted: Reading, known: Named) -> Job[S
 def fitting(clinic: Clinic, atlas: Path, scan: Scan, known: Named) -> Job[tuple[Fitted, Scan]]:
     """Fits an open atlas to a scan; hands over what was found, and the scan as it lay for it."""
     return lambda deliver, progress: deliver(clinic.fit(atlas, scan, known, progress))
+
+
+Outcome = tuple[OpenScan, Named, tuple[Fitted, Scan] | InputError]
+"""Who was to be fitted, with what is known of them, and what came of it."""
+
+
+def fitting_all(clinic: Clinic, atlas: Path, patients: Sequence[tuple[OpenScan, Named]]) -> Job[Outcome]:
+    """Fits an open atlas to scans one by one; hands over each as it is found, or why it was not."""
+
+    def job(deliver: Deliver[Outcome], progress: Progress) -> None:
+        for (patient, known), piece in progress.over(patients):
+            try:
+                deliver((patient, known, clinic.fit(atlas, patient.scan, known, piece)))
+            except InputError as error:
+                deliver((patient, known, error))
+
+    return job
+
+
+def reading_table(clinic: Clinic, atlas: Path, table: Path) -> Job[tuple[Stated, ...]]:
+    """Reads what a table says of scans; hands it over."""
+    return lambda deliver, _progress: deliver(clinic.stated(atlas, table))
 
 
 def saving(engine: Engine, session: Session, persons: Sequence[int], path: Path) -> Job[Path]:

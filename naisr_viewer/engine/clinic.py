@@ -16,7 +16,7 @@ from naisr_viewer.engine.engine import Engine
 from naisr_viewer.engine.people import FittedPerson
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.layouts import FULL_SHAPE
-from naisr_viewer.state.patients import Fitted, Labels, Named, Reading, Scan
+from naisr_viewer.state.patients import Fitted, Labels, Named, Reading, Scan, Stated
 from naisr_viewer.state.requests import EXACT_RESOLUTION, SurfaceRequest, SurfaceResult
 
 if TYPE_CHECKING:
@@ -106,6 +106,17 @@ class Clinic:
         placed = scan if lies is taken else self._scan(lies)
         person = FittedPerson(atlas, fit, placed)
         return self._measured(person, progress.part(FIT_SHARE, 1.0)), placed
+
+    def stated(self, atlas: Path, table: Path) -> tuple[Stated, ...]:
+        """What a table of a cohort says of scans, row by row, in the covariates of an open atlas.
+
+        Raises:
+            InputError: when the table cannot be used.
+        """
+        from naisr_model.cohorts.table import read_cohort
+
+        rows = read_cohort(table, self._engine.atlas(atlas).covariates).rows
+        return tuple(Stated(row.scan, row.known, row.fault) for row in rows)
 
     def forget(self, fit: Fitted) -> None:
         """A fit that nobody asks for any more."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +14,7 @@ from naisr_viewer.state.drawer import Tab, tabs_of
 from naisr_viewer.state.layouts import Cell, Layout
 from naisr_viewer.state.matrix import Matrix, first_matrix, values_at
 from naisr_viewer.state.overlay import NOTHING_SHOWN, Overlay
-from naisr_viewer.state.patients import Fitted, Named, OpenScan
+from naisr_viewer.state.patients import Fitted, Named, OpenScan, Stated
 from naisr_viewer.state.pins import Pin, Point, with_pin
 from naisr_viewer.state.section import Section
 from naisr_viewer.state.support import NOTHING_CHOSEN, Support, suited
@@ -206,6 +207,33 @@ def with_patient(state: ExplorerState, patient: OpenScan) -> ExplorerState:
     others = [each for each in state.patients if each.key != patient.key]
     patients = tuple(sorted((*others, patient), key=lambda each: each.key))
     return showing(replace(state, patients=patients), patient.key)
+
+
+def with_changed(state: ExplorerState, patient: OpenScan) -> ExplorerState:
+    """A patient changed who is open; the one that is shown stays."""
+    patients = tuple(patient if each.key == patient.key else each for each in state.patients)
+    return replace(state, patients=patients)
+
+
+def unfitted(state: ExplorerState) -> tuple[OpenScan, ...]:
+    """Who can be fitted and is not, the one that is shown last: it stays on screen until then."""
+    chosen = [each for each in state.patients if each.fit is None and not each.scan.blocked]
+    return tuple(sorted(chosen, key=lambda each: (each.key == state.patient, each.key)))
+
+
+def stated_of(patient: OpenScan, stated: Iterable[Stated]) -> tuple[Stated, ...]:
+    """What a table says of a patient's file, every row of it once."""
+    path = patient.reading.path.resolve()
+    return tuple(dict.fromkeys(each for each in stated if each.path.resolve() == path))
+
+
+def with_stated(state: ExplorerState, stated: Collection[Stated]) -> ExplorerState:
+    """What a table says is known of the open scans, where it says one thing; other fits are void then."""
+    for patient in state.patients:
+        found = [each for each in stated_of(patient, stated) if not each.fault]
+        if len(found) == 1 and found[0].known != patient.known:
+            state = with_changed(state, replace(patient, known=found[0].known, fit=None))
+    return showing(state, state.patient)
 
 
 def without_patient(state: ExplorerState, key: int) -> ExplorerState:

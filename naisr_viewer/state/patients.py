@@ -51,6 +51,21 @@ class Labels:
     titles: tuple[tuple[int | str, str], ...]
 
 
+@dataclass(frozen=True)
+class Stated:
+    """What a table says of one scan.
+
+    Attributes:
+        path: of the scan.
+        known: covariates that are given.
+        fault: why the row cannot be used, a sentence; empty where it can.
+    """
+
+    path: Path
+    known: Named
+    fault: str = ""
+
+
 @dataclass(frozen=True, eq=False)
 class Scan:
     """A patient's measured shape in the frame of the atlas.

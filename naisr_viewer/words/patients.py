@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from naisr_viewer.state.atlas_card import AtlasCard
-from naisr_viewer.state.patients import Fitted, Method, Scan
+from naisr_viewer.state.patients import Fitted, Method, Scan, Stated
 from naisr_viewer.words.numbers import capitalised, duration, given, interval_reading, length, reading, volume
 from naisr_viewer.words.titles import label
 
@@ -102,3 +104,14 @@ def sentence(text: str) -> str:
 def breakable(text: str, longest: int = LONGEST_WORD) -> str:
     """``text`` with words of more letters than the ``longest`` that can be broken anywhere."""
     return " ".join("\u200b".join(word) if len(word) > longest else word for word in text.split(" "))
+
+
+def doubt(name: str, stated: Sequence[Stated]) -> str:
+    """Why nothing was taken of what a table says of a scan, a sentence; empty where it was."""
+    if not stated:
+        return f"no row names {name}; its column 'mesh' has to hold the file."
+    if faults := [each.fault for each in stated if each.fault]:
+        return f"the row of {name} cannot be used: {faults[0]}."
+    if len(stated) > 1:
+        return f"{len(stated)} rows say different things of {name}; leave one."
+    return ""

@@ -43,6 +43,13 @@ def ask_scan_path(parent: QWidget, atlas: AtlasCard | None) -> Path | None:
     return Path(name) if name else None
 
 
+def ask_table_path(parent: QWidget) -> Path | None:
+    """A table of scans, or None."""
+    filters = "Tables (*.csv *.tsv *.txt *.xlsx);;All files (*)"
+    name, _ = QFileDialog.getOpenFileName(parent, "Known covariates from a table", "", filters)
+    return Path(name) if name else None
+
+
 def ask_session_path(parent: QWidget) -> Path | None:
     """The session to open, or None."""
     name, _ = QFileDialog.getOpenFileName(parent, "Open a session", "", SESSION_FILTER)

@@ -12,7 +12,7 @@ from naisr_model.covariates import Covariate
 from naisr_viewer.panels.kinds import layouts_of
 from naisr_viewer.state.atlas_card import AtlasCard
 from naisr_viewer.state.curves import Standing
-from naisr_viewer.state.explorer import ExplorerState
+from naisr_viewer.state.explorer import ExplorerState, unfitted
 from naisr_viewer.state.layouts import Layout
 from naisr_viewer.state.patients import Named, OpenScan
 from naisr_viewer.views.focus import in_order
@@ -21,6 +21,7 @@ from naisr_viewer.views.patients.list import PatientList
 from naisr_viewer.views.patients.pieces import button, exchange, paragraph
 from naisr_viewer.views.patients.result import ComparePart, result_part, standings_part
 from naisr_viewer.views.patients.scan import AlignmentPart, ScanPart
+from naisr_viewer.views.patients.together import TogetherPart
 from naisr_viewer.words.numbers import capitalised
 from naisr_viewer.words.patients import scans_of
 
@@ -37,6 +38,8 @@ class PatientPanel(QFrame):
     close_requested = Signal(int)  # key
     reread_requested = Signal()  # the shown patient's file shall be read again
     reading_changed = Signal(object)  # a Reading of the same file with another alignment or unit
+    table_chosen = Signal(object)  # Path of a table that says what is known of the open scans
+    fit_all_requested = Signal(object)  # what is known of each open scan: Named by its key
     fit_requested = Signal(tuple)  # Named, the known covariates in the atlas's order
     compared_chosen = Signal(object)  # key, or None for the patient as fitted
     ghost_toggled = Signal(bool)  # whether the scan is drawn over the shape
@@ -54,6 +57,7 @@ class PatientPanel(QFrame):
         self.open = button("Open scan…", "")
         self.invitation = paragraph(style="muted")
         self.list = PatientList(self._inside)
+        self.together = TogetherPart(self._inside)
         self.scan = ScanPart(self._inside)
         self.alignment = AlignmentPart(self._inside)
         self.known = KnownPart(self._inside)
@@ -75,6 +79,7 @@ class PatientPanel(QFrame):
         self.invitation.setVisible(not state.patients)
         self.list.setVisible(bool(state.patients))
         self.list.show_patients(state.patients, state.patient, state.atlas)
+        self.together.show_patients(state.patients, len(unfitted(state)))
         for part in (self.scan, self.alignment, self.known, self._foot):
             part.setVisible(state.shown is not None)
         self.result.setVisible(state.fit is not None)
@@ -105,6 +110,8 @@ class PatientPanel(QFrame):
             self.scan.reread_changed,
             self._area,
             self.list,
+            self.together.known,
+            self.together.fit,
             self.scan.reread,
             self.scan.relabel,
             self.scan.ghost,
@@ -131,10 +138,18 @@ class PatientPanel(QFrame):
         if new is None:
             return
         if old is None or old.key != new.key:
-            known, typed = self._drafts.get(new.key, (new.known, new.known))
-            self.known.give(typed if known == new.known else new.known)
+            self.known.give(self._draft(new))
         elif new.known != old.known and (new.known or new.fit):
             self.known.give(new.known)
+
+    def _typed(self) -> dict[int, Named]:
+        """What is known of each open scan, what was typed and not yet used too."""
+        typed = {each.key: self._draft(each) for each in self._state.patients}
+        return typed | ({} if self._state.shown is None else {self._state.shown.key: self.known.given()})
+
+    def _draft(self, patient: OpenScan) -> Named:
+        known, typed = self._drafts.get(patient.key, (patient.known, patient.known))
+        return typed if known == patient.known else patient.known
 
     def _show_patient(self, new: OpenScan, old: OpenScan | None) -> None:
         state = self._state
@@ -179,6 +194,7 @@ class PatientPanel(QFrame):
         for part in (
             self.invitation,
             self.list,
+            self.together,
             self.scan,
             self.alignment,
             self.known,
@@ -224,6 +240,8 @@ class PatientPanel(QFrame):
         self.open.clicked.connect(self.open_requested)
         self.list.patient_chosen.connect(self.patient_chosen)
         self.list.close_requested.connect(self.close_requested)
+        self.together.table_chosen.connect(self.table_chosen)
+        self.together.fit.clicked.connect(lambda: self.fit_all_requested.emit(self._typed()))
         self.scan.relabel.clicked.connect(self._read_another_label)
         for reread in (self.scan.reread, self.scan.reread_changed):
             reread.clicked.connect(self.reread_requested)

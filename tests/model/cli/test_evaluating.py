@@ -44,7 +44,7 @@ def test_a_journal_of_another_evaluation_is_refused(egg_atlas, egg_store, tmp_pa
     assert cli.main([*words, *given, "1"]) == 0
     kept = journal.read_bytes()
     assert cli.main([*words, *given, "2"]) == 2
-    assert "keeps an evaluation with another limit; name another journal" in capsys.readouterr().err
+    assert "keeps a run with another limit; name another journal" in capsys.readouterr().err
     assert cli.main([*words, "--limit", "1", "--workers", "0"]) == 2
     assert "the number of workers is 0" in capsys.readouterr().err
     assert journal.read_bytes() == kept

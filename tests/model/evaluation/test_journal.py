@@ -64,8 +64,8 @@ def test_a_run_may_be_killed_while_the_first_line_is_written(path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"program": "2e"}, "keeps an evaluation with another program; name another journal"),
-        ({"limit": 3}, r"journal.jsonl keeps an evaluation with another limit; name another journal"),
+        ({"program": "2e"}, "keeps a run with another program; name another journal"),
+        ({"limit": 3}, r"journal.jsonl keeps a run with another limit; name another journal"),
         ({"limit": 3, "atlas": "cd34"}, "another atlas and another limit"),
         ({"patients": 7}, "keeps something else"),
     ],
@@ -87,7 +87,7 @@ def test_no_other_file_is_taken_for_a_journal(tmp_path, content):
     if not content.endswith("\n") and content.startswith('{"program"'):
         assert read(path, WHAT) == {}
         return
-    with pytest.raises(InputError, match="no journal of an evaluation; name another file"):
+    with pytest.raises(InputError, match="no journal; name another file"):
         read(path, WHAT)
     assert path.read_text() == content
 

@@ -98,7 +98,7 @@ def test_a_journal_is_of_one_study_with_one_atlas_and_its_options(squares, tmp_p
     moved = squares.atlas.rename(tmp_path / "moved")
     assert identity(replace(squares, atlas=moved)) == json.loads(journal.read_text().splitlines()[0])
     moved.write_text("another atlas")
-    with pytest.raises(InputError, match="an evaluation with another atlas; name another journal"):
+    with pytest.raises(InputError, match="a run with another atlas; name another journal"):
         run(replace(squares, atlas=moved), journal=journal)
 
 
@@ -158,7 +158,7 @@ def test_a_journal_is_of_one_program(squares, tmp_path):
     first, *cases = journal.read_text().splitlines()
     other = json.dumps(json.loads(first) | {"program": "of yesterday"})
     journal.write_text("\n".join([other, *cases]) + "\n")
-    with pytest.raises(InputError, match="an evaluation with another program; name another journal"):
+    with pytest.raises(InputError, match="a run with another program; name another journal"):
         run(squares, journal=journal)
 
 

@@ -740,3 +740,69 @@ def test_a_session_that_is_cancelled_takes_nothing_away(ready, qtbot, scan_file,
     window.covariates.value_settled.emit("age", 3.0)
     settle(qtbot, controller)
     assert controller.shown[FULL_SHAPE].request.person == before.person  # who is still known
+
+
+@pytest.fixture
+def three(ready, qtbot, tmp_path):
+    """Three scans that are open, with a table of what is known of two of them."""
+    window, controller = ready
+    for number, (age, sex) in enumerate([(6.0, 1.0), (3.0, -1.0), (5.0, 1.0)], start=1):
+        egg(age, sex).export(tmp_path / f"p{number}.stl")
+        drop(window, tmp_path / f"p{number}.stl")
+        settle(qtbot, controller)
+    table = tmp_path / "known.csv"
+    table.write_text("mesh,subject,age [years],sex\np1.stl,A,6,M\np2.stl,B,3,\np3.stl,C,old,M\n")
+    return window, controller, table
+
+
+def test_all_scans_are_fitted_with_what_a_table_says_is_known(three, qtbot, monkeypatch):
+    window, controller, table = three
+    together = window.patients.together
+    assert together.isVisible() and together.fit.isEnabled()
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *args, **more: (str(table), ""))
+    click(together.known)
+    settle(qtbot, controller)
+    assert [dict(each.known) for each in controller.state.patients] == [
+        {"age": 6.0, "sex": 1.0},
+        {"age": 3.0},
+        {},
+    ]
+    told = (
+        "known.csv: the row of p3.stl cannot be used: covariate 'age' is 'old'; expected a number in years."
+    )
+    assert window.error_text.text() == told
+    assert "Known of 2 of 3 scans by known.csv" in window.status.text()
+    type_known(window, "age", "5")  # of p3.stl, which is shown
+    shown = controller.state.patient
+    click(together.fit)
+    settle(qtbot, controller)
+    first, second, third = controller.state.patients
+    assert controller.state.patient == shown == third.key and not window.error_text.text()
+    assert dict(first.fit.values) == {"age": 6.0, "sex": 1.0} and not first.fit.intervals
+    assert [name for name, _, _ in second.fit.intervals] == ["sex"] and dict(second.fit.values)["sex"] == -1.0
+    assert dict(third.known) == {"age": 5.0}
+    for each, (age, sex) in zip((first, second, third), [(6.0, 1.0), (3.0, -1.0), (5.0, 1.0)], strict=True):
+        assert each.fit.volume_cm3 == pytest.approx(egg(age, sex).volume / 1000, rel=0.05)
+    assert not together.fit.isEnabled()
+
+
+def test_what_was_fitted_stays_when_fitting_all_is_cancelled(three, qtbot):
+    window, controller, _ = three
+    click(window.patients.together.fit)
+    qtbot.waitUntil(lambda: any(each.fit for each in controller.state.patients), timeout=60_000)
+    controller.refinement.cancel()
+    settle(qtbot, controller)
+    fits = [each.fit is not None for each in controller.state.patients]
+    assert fits[0] and not fits[2]
+    assert window.patients.together.fit.isEnabled()
+
+
+def test_a_value_out_of_range_is_told_with_its_scan_before_anything_is_fitted(three, qtbot):
+    window, controller, _ = three
+    type_known(window, "age", "99")
+    click(window.patients.together.fit)
+    settle(qtbot, controller)
+    assert window.error_text.text().startswith(
+        "p3.stl: Age is 99 years; the atlas was made from 1 to 9 years."
+    )
+    assert not any(each.fit for each in controller.state.patients)

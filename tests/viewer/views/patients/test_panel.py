@@ -438,10 +438,11 @@ def test_the_tab_key_goes_from_top_to_bottom(panel, start, qtbot):
     panel.open.setFocus()
     qtbot.waitUntil(panel.open.hasFocus)
     seen = []
-    for _ in range(14):
+    for _ in range(15):
         QTest.keyClick(panel.window(), Qt.Key.Key_Tab)
         seen.append(QApplication.focusWidget())
-    expected = [panel.list, panel.scan.reread, panel.scan.ghost, panel.alignment.method, panel.alignment.unit]
+    top = [panel.list, panel.together.known, panel.scan.reread, panel.scan.ghost]
+    expected = [*top, panel.alignment.method, panel.alignment.unit]
     assert [each for each in seen if each in [*expected, *panel.known.stops(), panel.compare.box]] == [
         *expected,
         *panel.known.stops(),
