@@ -111,7 +111,8 @@ class ConfidenceStudy:
             ]
             for name, row in report["rows"].items()
         ]
-        title = f"**True volumes and the 95 % intervals of the population's, {report['atlases']} atlases**"
+        count = f"{report['atlases']} atlas{'' if report['atlases'] == 1 else 'es'}"
+        title = f"**True volumes and the 95 % intervals of the population's, {count}**"
         return f"{title}\n\n{markdown_table(header, rows)}"
 
 
