@@ -23,7 +23,6 @@ from naisr_model.cohorts.rows import Bench, CohortOptions, fit_row
 from naisr_model.cohorts.table import CohortRow, read_cohort
 from naisr_model.errors import InputError
 from naisr_model.evaluation.held_out import opened
-from naisr_model.evaluation.journal import Keep, Record, keeping, plain
 from naisr_model.files import sha256_of, stamp_of, write_all
 from naisr_model.measures.kept import load_norms, save_norms
 from naisr_model.measures.kinds import MEASURES
@@ -31,6 +30,7 @@ from naisr_model.measures.norms import Norms, norms_of
 from naisr_model.progress import SILENT, Progress
 from naisr_model.work.cluster import cluster as over_cluster
 from naisr_model.work.cluster import program
+from naisr_model.work.journal import Keep, Record, keeping, plain
 from naisr_model.work.run import Run, processes
 
 JOURNAL, CSV, PARQUET, PAGE = "journal.jsonl", "results.csv", "results.parquet", "report.html"

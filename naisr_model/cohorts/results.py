@@ -14,9 +14,9 @@ from naisr_model.atlas import Atlas
 from naisr_model.cohorts.table import CohortRow, CohortTable
 from naisr_model.covariates import Covariate
 from naisr_model.errors import InputError
-from naisr_model.evaluation.journal import Record
 from naisr_model.measures.kinds import MEASURES
 from naisr_model.measures.norms import Norms
+from naisr_model.work.journal import Record
 
 Cell = str | float | int | None
 """None where nothing is known."""

@@ -18,7 +18,6 @@ from naisr_model.atlas import Atlas, Fit
 from naisr_model.cohorts.table import CohortRow
 from naisr_model.errors import InputError
 from naisr_model.evaluation.held_out import opened
-from naisr_model.evaluation.journal import Record, plain
 from naisr_model.measures.curves import shapes_along
 from naisr_model.measures.kept import load_norms
 from naisr_model.measures.kinds import MEASURES, Surface, surface_of
@@ -27,6 +26,7 @@ from naisr_model.patients.evolution import fit_record
 from naisr_model.patients.fitting import fitted_in_place
 from naisr_model.patients.intake import take_in
 from naisr_model.progress import SILENT, Progress
+from naisr_model.work.journal import Record, plain
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from naisr_model.evaluation.journal import Record
 from naisr_model.evaluation.metrics import METRICS, Distances, all_metrics
 from naisr_model.evaluation.published import Published
+from naisr_model.work.journal import Record
 
 DEFINITIONS = {metric.key: metric.definition for metric in METRICS}
 """What each measured column of the record means; ``scale`` below applies to the ``_x100`` ones."""

@@ -17,10 +17,10 @@ from typing import Any, ClassVar, Protocol, TypeVar
 
 from naisr_model.data.store import INDEX
 from naisr_model.errors import InputError
-from naisr_model.evaluation import journal as journals
-from naisr_model.evaluation.journal import Keep, Record, plain
 from naisr_model.files import sha256_of, sources_digest
 from naisr_model.progress import SILENT, Progress
+from naisr_model.work import journal as journals
+from naisr_model.work.journal import Keep, Record, plain
 from naisr_model.work.run import processes
 
 

@@ -145,7 +145,7 @@ WRITERS = {
         (temporary / "many").write_bytes(bytes(100_000))
     """,
     "a journal": """
-    from naisr_model.evaluation.journal import keeping
+    from naisr_model.work.journal import keeping
     with keeping(Path("OUT/file.jsonl"), {"study": "Reach"}) as (_, keep):
         for number in range(1000):
             keep(str(number), {"text": "x" * 100})

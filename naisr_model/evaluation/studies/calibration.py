@@ -14,8 +14,8 @@ from naisr_model.covariates import require_known
 from naisr_model.data.populations import MOST_PATIENTS, PopulationVisit
 from naisr_model.errors import InputError
 from naisr_model.evaluation.held_out import aligned, known_population, opened, visits_of
-from naisr_model.evaluation.journal import Record
 from naisr_model.progress import SILENT, Progress
+from naisr_model.work.journal import Record
 
 OTHER_SEED = 1000
 """Added to the seed of the atlas's population, so that nobody in it is met again."""

@@ -14,7 +14,6 @@ from naisr_model.atlas import Atlas
 from naisr_model.errors import InputError
 from naisr_model.evaluation import published
 from naisr_model.evaluation.held_out import opened
-from naisr_model.evaluation.journal import Record
 from naisr_model.evaluation.reports import (
     columns_of,
     definitions,
@@ -24,6 +23,7 @@ from naisr_model.evaluation.reports import (
 )
 from naisr_model.evaluation.studies.reconstruction import Question, Reconstruction
 from naisr_model.progress import SILENT, Progress
+from naisr_model.work.journal import Record
 
 WAYS = {"given": "covariates given", "inferred": "covariates inferred"}
 

@@ -21,10 +21,10 @@ from naisr_model.evaluation.held_out import (
     opened,
     require_shapes,
 )
-from naisr_model.evaluation.journal import Record
 from naisr_model.evaluation.metrics import volume_difference_cm3
 from naisr_model.evaluation.reports import markdown_table, mean_and_median, pair_cell
 from naisr_model.progress import SILENT, Progress
+from naisr_model.work.journal import Record
 
 SHARE = 1 / 3
 """Of the area, cut away."""

@@ -13,12 +13,12 @@ import numpy as np
 from naisr_model.atlas import Atlas
 from naisr_model.errors import InputError
 from naisr_model.evaluation.held_out import known_population, opened
-from naisr_model.evaluation.journal import Record
 from naisr_model.evaluation.reports import markdown_table
 from naisr_model.evaluation.truth import Place, beside_truth, truth_places
 from naisr_model.measures.kinds import VOLUME
 from naisr_model.measures.norms import Norms, norms_of
 from naisr_model.progress import SILENT, Progress
+from naisr_model.work.journal import Record
 
 RESOLUTION = 128
 

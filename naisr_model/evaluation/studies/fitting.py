@@ -18,11 +18,11 @@ from naisr_model.covariates import normalised_vector
 from naisr_model.data.samples import ShapeSamples, sample_shape
 from naisr_model.errors import InputError
 from naisr_model.evaluation.held_out import HeldOut, held_out, held_out_rows, opened, require_shapes
-from naisr_model.evaluation.journal import Record
 from naisr_model.evaluation.reports import markdown_table
 from naisr_model.learning.fitting.paper import fit_latents
 from naisr_model.learning.training.objective import Batch
 from naisr_model.progress import SILENT, Progress
+from naisr_model.work.journal import Record
 
 SAMPLES, CHECK_POINTS, CHECK_SEED = 20_000, 4000, 1
 MOST_STEPS = 100_000

@@ -14,13 +14,13 @@ from scipy.stats import kstest
 
 from naisr_model.atlas import Atlas
 from naisr_model.evaluation.held_out import aligned, known_population, opened
-from naisr_model.evaluation.journal import Record
 from naisr_model.evaluation.studies.calibration import NewPatient, new_patients, visit_of
 from naisr_model.learning.fitting.posterior import TWO_SIDED_95
 from naisr_model.measures.curves import shapes_along
 from naisr_model.measures.kinds import MEASURES, measured
 from naisr_model.measures.norms import Norms, norms_of
 from naisr_model.progress import SILENT, Progress
+from naisr_model.work.journal import Record
 
 SCAN = "volume of the scan"
 """What is told of the true shape itself; all else is of the fit."""

@@ -12,7 +12,6 @@ from naisr_model.covariates import Values
 from naisr_model.errors import InputError
 from naisr_model.evaluation import published
 from naisr_model.evaluation.held_out import HeldOut, held_out, held_out_rows, opened, require_shapes
-from naisr_model.evaluation.journal import Record
 from naisr_model.evaluation.metrics import Distances, compare, component_count
 from naisr_model.evaluation.published import Published
 from naisr_model.evaluation.reports import (
@@ -28,6 +27,7 @@ from naisr_model.evaluation.soundness import components, folded_share, mean_disp
 from naisr_model.evaluation.truth import Place, beside_truth, truth_places
 from naisr_model.frames import Extent
 from naisr_model.progress import SILENT, Progress
+from naisr_model.work.journal import Record
 
 RESOLUTION = 192
 """Of the surfaces that are measured."""

@@ -32,7 +32,6 @@ from naisr_model.evaluation.held_out import (
     source_visits,
     synthetic,
 )
-from naisr_model.evaluation.journal import Record
 from naisr_model.evaluation.metrics import Distances, compare
 from naisr_model.evaluation.published import Published
 from naisr_model.evaluation.reports import (
@@ -47,6 +46,7 @@ from naisr_model.evaluation.reports import (
 from naisr_model.frames import Extent
 from naisr_model.progress import SILENT, Progress
 from naisr_model.shapes.kinds import Shape
+from naisr_model.work.journal import Record
 
 WAYS = {
     "given": "fitted, covariates given",

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from naisr_model.errors import InputError
-from naisr_model.evaluation.journal import keeping, plain, read
+from naisr_model.work.journal import keeping, plain, read
 
 ROOT = Path(__file__).parents[3]
 WHAT = {"program": "1f", "study": "Reach", "atlas": "ab12", "limit": 2}
@@ -95,7 +95,7 @@ def test_no_other_file_is_taken_for_a_journal(tmp_path, content):
 HOLD = """
 import json, sys, time
 from pathlib import Path
-from naisr_model.evaluation.journal import keeping
+from naisr_model.work.journal import keeping
 path, what = Path(sys.argv[1]), json.loads(sys.argv[2])
 with keeping(path, what) as (_, keep):
     keep("row 3", {})
