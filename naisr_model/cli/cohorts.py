@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from cyclopts import App, Parameter
 
 from naisr_model.cli.console import bar
-from naisr_model.cli.options import AtlasFile, FolderToWrite
+from naisr_model.cli.options import AtlasFile, ClusterAddress, FolderToWrite
 
 cohort = App(name="cohort", help="Fit many scans at once.")
 
@@ -46,12 +46,7 @@ def fit(
         ),
     ] = None,
     workers: Annotated[int | None, Parameter(help="processes; left out, one a core.")] = None,
-    cluster: Annotated[
-        str | None,
-        Parameter(
-            help="address of a dask scheduler whose workers share the work, as tcp://node17:8786, or local:4."
-        ),
-    ] = None,
+    cluster: ClusterAddress = None,
 ) -> None:
     """Fit an atlas to every scan that a table names; one that was stopped goes on where it was.
 

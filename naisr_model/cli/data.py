@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from naisr_model.cli.console import bar
-from naisr_model.cli.options import FolderToWrite
+from naisr_model.cli.options import ClusterAddress, FolderToWrite
 from naisr_model.data.populations import POPULATIONS, population, require_own
 from naisr_model.data.remarks import gravest_first
 from naisr_model.errors import InputError
@@ -43,6 +43,7 @@ def prepare(
     held_out: float = 0.2,
     seed: int = 0,
     workers: int | None = None,
+    cluster: ClusterAddress = None,
     accept: list[int] | None = None,
 ) -> None:
     """Turn a CSV of meshes and covariates into a store of samples to train on.
@@ -61,6 +62,7 @@ def prepare(
         held_out: share of the subjects kept for evaluation.
         seed: of the split and of the samples.
         workers: processes; left out, one a core.
+        cluster: of dask workers in their place.
         accept: a row, the header being 1, that you have looked at and that is right, as a true 999 or the
             mesh of a twin; it is not left out for being unlike the others. For several rows give it again.
     """
@@ -71,7 +73,7 @@ def prepare(
     if out is None and not check:
         raise InputError("give the folder of the store, --out FOLDER, or --check to look at the table alone")
     counts, accepted = (surface_samples, near_samples, uniform_samples), tuple(accept or ())
-    options = PrepareOptions(*counts, held_out, seed, workers, accepted)
+    options = PrepareOptions(*counts, held_out, seed, workers, cluster, accepted)
     require_possible(options)
     read = read_table(table, accepted)
     for line in (*read.summary, *(f"{one.severity}: {one.text}" for one in gravest_first(read.remarks))):

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from cyclopts import App, Parameter
 
 from naisr_model.cli.console import bar, told_anyway, write_json
-from naisr_model.cli.options import FileToWrite, JsonFile
+from naisr_model.cli.options import ClusterAddress, FileToWrite, JsonFile
 from naisr_model.errors import InputError
 from naisr_model.evaluation.studies import STUDIES
 from naisr_model.evaluation.study import Study, run
@@ -26,12 +26,17 @@ Workers = Annotated[
 
 def _command(name: str, kind: type[Study[Any]]) -> Callable[..., None]:
     def measure(
-        study: Any, *, journal: JournalFile = None, workers: Workers = 1, json_file: JsonFile = None
+        study: Any,
+        *,
+        journal: JournalFile = None,
+        workers: Workers = 1,
+        cluster: ClusterAddress = None,
+        json_file: JsonFile = None,
     ) -> None:
         if journal is not None and json_file is not None and json_file.resolve() == journal.resolve():
             raise InputError(f"{journal} is to be the journal and the report; name two files")
         with bar(name) as progress:
-            report = run(study, workers=workers, journal=journal, progress=progress)
+            report = run(study, workers=workers, cluster=cluster, journal=journal, progress=progress)
         with told_anyway(lambda: print(study.markdown(report))):
             write_json(json_file, report)
 

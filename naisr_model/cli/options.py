@@ -65,6 +65,15 @@ JsonFile = Annotated[
 ]
 
 
+ClusterAddress = Annotated[
+    str | None,
+    Parameter(
+        name="--cluster",
+        help="address of a dask scheduler whose workers share the work, as tcp://node17:8786; or local:4.",
+    ),
+]
+
+
 def seconds(text: str) -> float:
     """``90s``, ``45m`` or ``1.5h`` in seconds.
 

@@ -28,10 +28,9 @@ from naisr_model.measures.kept import load_norms, save_norms
 from naisr_model.measures.kinds import MEASURES
 from naisr_model.measures.norms import Norms, norms_of
 from naisr_model.progress import SILENT, Progress
-from naisr_model.work.cluster import cluster as over_cluster
-from naisr_model.work.cluster import program
+from naisr_model.work.cluster import program, shared
 from naisr_model.work.journal import Keep, Record, keeping, plain
-from naisr_model.work.run import Run, processes
+from naisr_model.work.run import Run
 
 JOURNAL, CSV, PARQUET, PAGE = "journal.jsonl", "results.csv", "results.parquet", "report.html"
 
@@ -67,10 +66,8 @@ def fit_cohort(
         InputError: when the table or the atlas cannot be used, or the folder holds something else.
         Cancelled: when nobody waits any more.
     """
-    if cluster is not None and workers is not None:
-        raise InputError("--workers are processes on this machine, --cluster has its own; give one of them")
     table, atlas, out = table.absolute(), atlas.absolute(), out.absolute()
-    options = options or CohortOptions()
+    options, share = options or CohortOptions(), shared(workers, cluster)
     model, stamp = opened(atlas), stamp_of(atlas)
     require_measures(options.measures, model)
     read = read_cohort(table, model.covariates)
@@ -90,7 +87,6 @@ def fit_cohort(
 
         keys = [_key(row) for row in read.rows]
         rows = dict(zip(keys, read.rows, strict=True))
-        share = processes(workers) if cluster is None else over_cluster(cluster)
         is_here = cluster is None and workers == 1
         found = _found(rows, kept, add, bench, share, is_here, progress.part(KNOWING, TELLING))
         outcomes = tuple(Outcome(row, found[key]) for key, row in zip(keys, read.rows, strict=True))

@@ -42,12 +42,16 @@ from naisr_model.files import replacing, telling
 from naisr_model.frames import Frame, enclosing_frame
 from naisr_model.progress import SILENT, Progress
 from naisr_model.work.alone import alone
-from naisr_model.work.run import Run, in_order, processes
+from naisr_model.work.cluster import shared
+from naisr_model.work.run import Run, in_order
 
 REPORT = "report.json"
 _SAMPLES = re.compile(r"[0-9a-f]{24}")
 _HALF_DONE = re.compile(r"\.[0-9a-f]{24}\.\d+\.tmp")
 """Names of the folders that :func:`_sampling` and :func:`write_samples` make."""
+
+UNKEPT = frozenset({"workers", "cluster", "accepted"})
+"""Options that say nothing of the samples."""
 
 MOST_SAMPLES = 10_000_000
 """Of a kind and a shape: 240 MB."""
@@ -64,6 +68,7 @@ class PrepareOptions:
         held_out: share of the subjects kept for evaluation.
         seed: of the split and of the samples.
         workers: processes; None for one a core, 1 to stay in this process.
+        cluster: of dask workers that share the work in their place, see :mod:`~naisr_model.work.cluster`.
         accepted: rows of the table, the header being 1, that somebody has looked at: what only comparing
             them with the others suspects does not leave them out.
     """
@@ -74,6 +79,7 @@ class PrepareOptions:
     held_out: float = 0.2
     seed: int = 0
     workers: int | None = None
+    cluster: str | None = None
     accepted: tuple[int, ...] = ()
 
 
@@ -107,7 +113,7 @@ def prepare(
 
 
 def _prepare(table: ShapeTable, out: Path, options: PrepareOptions, progress: Progress) -> PreparationReport:
-    with processes(options.workers) as run:
+    with shared(options.workers, options.cluster) as run:
         held_out = held_out_mask([row.subject for row in table.rows], options.held_out, options.seed)
         looks = [(row, table.alignment.method) for row in table.rows]
         inspected = in_order(run(inspect, looks, progress.part(0.0, 0.05)))
@@ -128,7 +134,7 @@ def _prepare(table: ShapeTable, out: Path, options: PrepareOptions, progress: Pr
         frame=frame,
         alignment=alignment,
         source=table.source,
-        options={key: value for key, value in asdict(options).items() if key not in ("workers", "accepted")},
+        options={key: value for key, value in asdict(options).items() if key not in UNKEPT},
         folders=folders,
     )
     _remove(out / store.SHAPES, _SAMPLES, set(folders))

@@ -20,8 +20,8 @@ from naisr_model.errors import InputError
 from naisr_model.files import sha256_of, sources_digest
 from naisr_model.progress import SILENT, Progress
 from naisr_model.work import journal as journals
+from naisr_model.work.cluster import shared
 from naisr_model.work.journal import Keep, Record, plain
-from naisr_model.work.run import processes
 
 
 class Case(Protocol):
@@ -61,6 +61,7 @@ def run(
     study: Study[CaseType],
     *,
     workers: int | None = 1,
+    cluster: str | None = None,
     journal: Path | None = None,
     progress: Progress = SILENT,
 ) -> Record:
@@ -71,6 +72,7 @@ def run(
         workers: processes; None for one a core. The report is the same for any number of them. One is the
             default because a single process already uses all cores within a case, several need their memory
             each, and cases that measure time have to have the machine for themselves.
+        cluster: of dask workers that share the cases in their place, see :mod:`~naisr_model.work.cluster`.
         journal: file that keeps what is measured, so that a run that was stopped or killed goes on there.
         progress: told the finished share.
 
@@ -86,11 +88,12 @@ def run(
         raise InputError("there is nothing to measure with these options; ask for more")
     if len({case.key for case in cases}) < len(cases):
         raise ValueError(f"two cases of {study} have the same key")
-    with processes(workers) as work, _keeping(journal, started) as (kept, keep):
+    with shared(workers, cluster) as work, _keeping(journal, started) as (kept, keep):
         missing = [case for case in cases if case.key not in kept]
         left = progress.part(1 - len(missing) / len(cases), 1.0)
+        is_here = cluster is None and workers == 1
         # Whether anybody waits cannot be asked from other processes: there a case goes with its process.
-        measure = partial(study.measure, progress=left.quiet) if workers == 1 else study.measure
+        measure = partial(study.measure, progress=left.quiet) if is_here else study.measure
         records = dict(kept)
         for number, record in work(measure, missing, left):
             _require_unchanged(study, started)

@@ -1,16 +1,17 @@
 """Many like jobs over the workers of a dask cluster, with the same results as over processes.
 
-Functions, jobs and results travel; files do not: workers open them by the same paths, so that storage has to
-be shared. Only as many jobs are under way as keep the workers busy, however many wait.
+Functions, jobs and results travel; files do not: workers open them by the same paths from the same folder, so
+that storage has to be shared. Only as many jobs are under way as keep the workers busy, however many wait.
 """
 
 from __future__ import annotations
 
 import hashlib
 import logging
+import os
 import re
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from functools import lru_cache, partial
 from importlib import metadata
 from itertools import islice
@@ -20,7 +21,7 @@ from typing import Any
 from naisr_model.errors import InputError
 from naisr_model.files import sources_digest
 from naisr_model.progress import SILENT, Progress
-from naisr_model.work.run import MOST_WORKERS, POLL_S, Job, Result, Run, held_back
+from naisr_model.work.run import MOST_WORKERS, POLL_S, Job, Result, Run, held_back, processes
 
 AHEAD = 2
 """Jobs under way for each worker: it has the next one when it has finished one."""
@@ -32,6 +33,19 @@ PACKAGES = ("torch", "numpy", "scipy")
 """On whose versions results depend."""
 
 _LOCAL = re.compile(r"local:([0-9]{1,4})")
+
+
+def shared(workers: int | None, address: str | None) -> AbstractContextManager[Run]:
+    """:func:`~naisr_model.work.run.processes`, or :func:`cluster` where there is an address of one.
+
+    Raises:
+        InputError: for several processes and a cluster.
+    """
+    if address is None:
+        return processes(workers)
+    if workers not in (None, 1):
+        raise InputError("--workers are processes on this machine, --cluster has its own; give one of them")
+    return cluster(address)
 
 
 @contextmanager
@@ -125,17 +139,29 @@ def _other(why: str) -> InputError:
     )
 
 
+def _there(folder: str, function: Callable[[Job], Result], job: Job) -> Result:
+    """On a worker, where relative paths mean what they mean here."""
+    try:
+        os.chdir(folder)
+    except OSError as error:
+        raise InputError(
+            f"a worker of the cluster cannot get to {folder} ({error.strerror}); give all the same storage"
+        ) from error
+    return function(job)
+
+
 def _run(
     client: Any, function: Callable[[Job], Result], jobs: Sequence[Job], progress: Progress = SILENT
 ) -> Iterator[tuple[int, Result]]:
     from distributed import KilledWorker, wait
 
+    there = partial(_there, os.getcwd(), function)
     waiting, under_way, done = iter(enumerate(jobs)), dict[Any, int](), 0
     try:
         while True:
             room = AHEAD * max(1, len(client.scheduler_info()["workers"])) - len(under_way)
             for number, job in islice(waiting, max(0, room)):
-                under_way[client.submit(function, job, pure=False)] = number
+                under_way[client.submit(there, job, pure=False)] = number
             if not under_way:
                 return
             progress.check()

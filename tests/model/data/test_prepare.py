@@ -109,6 +109,14 @@ def test_processes_and_one_process_make_the_same_store(cohort, tmp_path):
     assert contents(tmp_path / "one") == contents(tmp_path / "two")
 
 
+def test_a_cluster_makes_the_same_store(cohort, tmp_path, monkeypatch):
+    pytest.importorskip("distributed", reason="the extra 'cluster' is not installed")
+    prepare(cohort, tmp_path / "one", options=SMALL)
+    monkeypatch.chdir(tmp_path)  # where relative paths are meant from
+    prepare(cohort, Path("two"), options=replace(SMALL, cluster="local:2"))
+    assert contents(tmp_path / "one") == contents(tmp_path / "two")
+
+
 def test_what_is_done_is_skipped_and_what_changed_is_done_again(cohort, tmp_path):
     out = tmp_path / "store"
     prepare(cohort, out, options=SMALL)

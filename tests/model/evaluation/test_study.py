@@ -231,6 +231,13 @@ def test_a_killed_run_goes_on_to_the_same_report(study, report, tmp_path):
     assert sorted(keys) == sorted(case.key for case in study.cases())
 
 
+def test_a_cluster_gives_the_report_of_one_process(study, report):
+    pytest.importorskip("distributed", reason="the extra 'cluster' is not installed")
+    assert run(study, cluster="local:1") == report
+    with pytest.raises(InputError, match="--workers are processes on this machine"):
+        run(study, workers=2, cluster="local:1")
+
+
 def test_two_processes_give_the_report_of_one(study, report, tmp_path):
     journal = tmp_path / "journal.jsonl"
     assert run(study, workers=2, journal=journal) == report
