@@ -301,18 +301,19 @@ class Norms:
         margins = [self._sure[name].margin(self.design.row(values))[0] for values in ways]
         return np.asarray(usual) * np.exp(np.array([[-1.0], [1.0]]) * margins)
 
-    def effect_margins_mm(self, origins_mm: ArrayLike, covariates: Values) -> NDArray[np.float64]:
-        """Half of the 95 % interval of how far covariates move points along the normal, ``[n]``.
+    def effect_margins_mm(self, origins_mm: ArrayLike, ways: Sequence[Values]) -> NDArray[np.float64]:
+        """Half of the 95 % interval of how far covariates move points along the normal, ``[m, n]``.
 
         Args:
             origins_mm: the points on the template, ``[n, 3]``.
-            covariates: real values by name; those left out stay at the centre and move nothing.
+            ways: m sets of real values by name; those left out stay at the centre and move nothing.
 
         Raises:
             InputError: when people are too few to say.
         """
-        margins_mm = self._sure_locally.margin(self.design.row(covariates) - self.design.row({}))
-        return blended(self.local.origins_mm, margins_mm, np.asarray(origins_mm))
+        centre = self.design.row({})
+        margins_mm = [self._sure_locally.margin(self.design.row(values) - centre) for values in ways]
+        return blended(self.local.origins_mm, np.stack(margins_mm, axis=1), np.asarray(origins_mm)).T
 
     def norms(self, covariates: Values, values: Mapping[str, float]) -> dict[str, Norm]:
         """Where values stand among people of the same covariates, by the name of the measure.

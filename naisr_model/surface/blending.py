@@ -18,12 +18,13 @@ def blended(known: NDArray, values: NDArray[np.float64], points: NDArray) -> NDA
 
     Args:
         known: where the values are known, ``[k, dim]``, at least one.
-        values: ``[k]``.
+        values: ``[k]``, or several of each, ``[k, ...]``.
         points: ``[n, dim]``, in the unit of ``known``.
 
     Returns:
-        ``[n]``.
+        ``[n]``, or ``[n, ...]``.
     """
     away, nearest = cKDTree(known).query(points, k=min(NEIGHBOURS, len(known)))
     weights = 1 / (away.reshape(len(points), -1) + TOUCHING)
-    return np.asarray(np.average(values[nearest.reshape(weights.shape)], axis=1, weights=weights))
+    shares = weights / weights.sum(axis=1, keepdims=True)
+    return np.asarray(np.einsum("nk,nk...->n...", shares, values[nearest.reshape(weights.shape)]))

@@ -95,8 +95,8 @@ def _with_margins(entries: tuple[Entry, ...], norms: Norms, values: Values) -> t
     """
     origins_mm = np.array([entry.pin.origin_mm for entry in entries]).reshape(-1, 3)
     ways = [{name: value} for name, value in values.items()]
-    singly = dict(zip(values, (norms.effect_margins_mm(origins_mm, one) for one in ways), strict=True))
-    together = norms.effect_margins_mm(origins_mm, values)
+    *effects, together = norms.effect_margins_mm(origins_mm, [*ways, values])
+    singly = dict(zip(values, effects, strict=True))
     return tuple(
         replace(
             entry,

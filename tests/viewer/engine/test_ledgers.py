@@ -88,8 +88,8 @@ def test_how_sure_a_bar_is_stands_beside_it_once_its_people_are_known(clicked, t
     age, sex = entry.parts
     assert replace(age, margin_mm=None) == told.entries[0].parts[0]
     origin, values = [state.pins[0].origin_mm], dict(state.named)
-    assert age.margin_mm == norms.effect_margins_mm(origin, {"age": values["age"]})[0] > 0
-    assert sex.margin_mm == norms.effect_margins_mm(origin, {"sex": values["sex"]})[0] > 0
+    (of_age,), (of_sex,) = norms.effect_margins_mm(origin, [{name: values[name]} for name in ("age", "sex")])
+    assert (age.margin_mm, sex.margin_mm) == (of_age, of_sex) and min(of_age, of_sex) > 0
     assert entry.total.margin_mm is None  # of a person: the code is not the population's
     request = asked(knowing_norms(state))
     average = replace(request, whole=replace(request.whole, person=0), others=())
