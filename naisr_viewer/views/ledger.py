@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
@@ -14,12 +15,12 @@ from naisr_viewer.views.colours import covariate_colour, pin_colour
 from naisr_viewer.views.elided import shortened
 from naisr_viewer.views.theme import LIGHT, Theme
 from naisr_viewer.words import ledger as words
-from naisr_viewer.words.numbers import MILLIMETRES
+from naisr_viewer.words.numbers import MILLIMETRES, way
 from naisr_viewer.words.titles import as_tip
 
 TITLE_PX, LINE_PX = 24, 20
-NAME_PX, FIGURE_PX, ALONG_PX = 96, 118, 118
-"""Widths of the name, of the figure and, where there is room, of what is along the surface."""
+NAME_PX, ALONG_PX, GAP_PX = 96, 118, 6
+"""Most of a name, what is along the surface where there is room for it, and what is left free between."""
 
 LEAST_BAR_PX = 48
 WIDEST_PX = 620
@@ -98,7 +99,7 @@ class EntryChart(QWidget):
     def sizeHint(self) -> QSize:
         """A line for each cause."""
         count = 1 if self._entry is None else len(words.lines(self._entry))
-        return QSize(NAME_PX + self._figure_px + 2 * LEAST_BAR_PX, TITLE_PX + count * LINE_PX)
+        return QSize(2 * NAME_PX + 2 * LEAST_BAR_PX, TITLE_PX + count * LINE_PX)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         """The title with the dot that marks the place on the shapes, and a line for each cause."""
@@ -115,28 +116,33 @@ class EntryChart(QWidget):
         if self._entry is None:
             self._write(painter, QRectF(0, TITLE_PX, self.width(), LINE_PX), words.NO_PLACE, muted=True)
         else:
-            for row, (name, part) in enumerate(words.lines(self._entry)):
-                self._paint_line(painter, TITLE_PX + row * LINE_PX, name, part)
+            self._paint_lines(painter, words.lines(self._entry))
         painter.end()
 
-    @property
-    def _figure_px(self) -> int:
-        """Room for a figure with its unit."""
-        return max(FIGURE_PX, self.fontMetrics().horizontalAdvance(f"−0.0888 {self._ink.unit}") + 6)
-
-    def _paint_line(self, painter: QPainter, top: float, name: str, part: Part) -> None:
-        has_room = self.width() >= NAME_PX + self._figure_px + ALONG_PX + 2 * LEAST_BAR_PX
-        along_px = ALONG_PX if has_room else 0
-        figure_px = self._figure_px
+    def _paint_lines(self, painter: QPainter, lines: Sequence[tuple[str, Part]]) -> None:
+        """A line each; how sure a figure is gives way where bars would be too short, and stands in the tip."""
+        names, parts = zip(*lines, strict=True)
+        name_px = min(NAME_PX, self._widest(names))
+        room = self.width() - name_px - 2 * LEAST_BAR_PX
+        figures = [words.across(part, self._ink.unit) for part in parts]
+        if self._widest(figures) > room:
+            figures = [way(part.normal_mm, self._ink.unit) for part in parts]
+        figure_px = self._widest(figures)
+        along_px = ALONG_PX if figure_px + ALONG_PX <= room else 0
         right = self.width() - figure_px - along_px
-        self._write(painter, QRectF(0, top, NAME_PX - 6, LINE_PX), name)
-        self._paint_bar(painter, QRectF(NAME_PX, top, right - NAME_PX - 6, LINE_PX), part)
         end = Qt.AlignmentFlag.AlignRight
-        figure = words.across(part, self._ink.unit)
-        self._write(painter, QRectF(right, top, figure_px, LINE_PX), figure, side=end)
-        if along_px:
-            box = QRectF(right + figure_px, top, along_px, LINE_PX)
-            self._write(painter, box, words.along(part, self._ink.unit), muted=True, side=end)
+        for row, (name, part, figure) in enumerate(zip(names, parts, figures, strict=True)):
+            top = TITLE_PX + row * LINE_PX
+            self._write(painter, QRectF(0, top, name_px - GAP_PX, LINE_PX), name)
+            self._paint_bar(painter, QRectF(name_px, top, right - name_px - GAP_PX, LINE_PX), part)
+            self._write(painter, QRectF(right, top, figure_px, LINE_PX), figure, side=end)
+            if along_px:
+                box = QRectF(right + figure_px, top, along_px, LINE_PX)
+                self._write(painter, box, words.along(part, self._ink.unit), muted=True, side=end)
+
+    def _widest(self, texts: Iterable[str]) -> int:
+        """Room for each of some texts, and the gap beside it."""
+        return max(map(self.fontMetrics().horizontalAdvance, texts)) + GAP_PX
 
     def _paint_bar(self, painter: QPainter, box: QRectF, part: Part) -> None:
         middle, half = box.center().x(), box.width() / 2
