@@ -120,7 +120,7 @@ class EntryChart(QWidget):
         painter.end()
 
     def _paint_lines(self, painter: QPainter, lines: Sequence[tuple[str, Part]]) -> None:
-        """A line each; how sure a figure is gives way where bars would be too short, and stands in the tip."""
+        """A line each; how sure a figure is gives way where bars would be too short: the tip has it."""
         names, parts = zip(*lines, strict=True)
         name_px = min(NAME_PX, self._widest(names))
         room = self.width() - name_px - 2 * LEAST_BAR_PX
