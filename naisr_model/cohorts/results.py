@@ -173,14 +173,16 @@ def _cells(one: Outcome, cohort: Cohort, measured: Mapping[str, str]) -> dict[st
     cells: dict[str, Cell] = {**about, **copied, "status": "rejected", "reason": one.reason}
     if one.reason:
         return cells
-    cells |= {"status": "fitted", **_covariate_cells(one.record, cohort.atlas.covariates)}
+    cells |= {"status": "fitted", **_covariate_cells(one, cohort.atlas.covariates)}
     return cells | _shape_cells(one, cohort, measured)
 
 
-def _covariate_cells(record: Record, covariates: Sequence[Covariate]) -> dict[str, Cell]:
+def _covariate_cells(one: Outcome, covariates: Sequence[Covariate]) -> dict[str, Cell]:
+    """What is known as it was given, to the last digit, and what was found of the others."""
+    record, values = one.record, {**one.record["covariates"], **dict(one.row.known)}
     cells: dict[str, Cell] = {"inferred": ", ".join(record["inferred"])}
     for covariate in covariates:
-        cells[covariate.name] = _value(covariate, record["covariates"][covariate.name])
+        cells[covariate.name] = _value(covariate, values[covariate.name])
         for name, end in zip(_ends(covariate), record["intervals"].get(covariate.name, ()), strict=False):
             cells[name] = _value(covariate, end)
     return cells
