@@ -17,7 +17,7 @@ FRAME_MS = 40
 
 
 class Player(QObject):
-    """Moves the covariate that was moved last to and fro until it is stopped, which is one step to undo.
+    """Moves a covariate, chosen or the last moved, to and fro until it is stopped: one step to undo.
 
     Previews follow as they do a slider that is dragged: what comes too late is left out.
 
@@ -34,6 +34,7 @@ class Player(QObject):
         self._frames = QTimer(self, interval=FRAME_MS)
         self._frames.timeout.connect(self._step)
         window.play_requested.connect(self.toggle)
+        window.covariates.play_clicked.connect(self.toggle_one)
         window.covariates.value_moved.connect(self._give_way)  # the user takes over
         window.covariates.values_moved.connect(self._give_way)
         window.closing.connect(self._give_way)
@@ -45,12 +46,20 @@ class Player(QObject):
         else:
             self._end(self._sweep)
 
-    def _begin(self) -> None:
-        self._sweep, self._began_s = sweep_of(self._controller.state), time.monotonic()
+    def toggle_one(self, name: str) -> None:
+        """The same of one covariate, in the place of any that plays."""
+        playing = self._sweep
+        if playing is not None:
+            self._end(playing)
+        if playing is None or playing.covariate.name != name:
+            self._begin(name)
+
+    def _begin(self, name: str = "") -> None:
+        self._sweep, self._began_s = sweep_of(self._controller.state, name), time.monotonic()
         if self._sweep is not None:
             self._controller.move(self._sweep.covariate.name, self._sweep.after(0))
             self._frames.start()
-        self._window.show_playing(self._sweep is not None)
+        self._window.show_playing("" if self._sweep is None else self._sweep.covariate.name)
 
     def _step(self) -> None:
         sweep, controller = self._sweep, self._controller
@@ -70,4 +79,4 @@ class Player(QObject):
     def _give_way(self, *_: object) -> None:
         self._frames.stop()
         self._sweep = None
-        self._window.show_playing(False)
+        self._window.show_playing("")

@@ -27,10 +27,11 @@ class Sweep:
         return min(max(round(low + share * (high - low), self.covariate.decimals), low), high)
 
 
-def sweep_of(state: ExplorerState) -> Sweep | None:
-    """Of the covariate that was moved last, from where it is; None where there are none."""
+def sweep_of(state: ExplorerState, name: str = "") -> Sweep | None:
+    """Of a covariate, else of the one that was moved last, from where it is; None where there are none."""
     if state.atlas is None or not state.atlas.covariates:
         return None
-    covariate = state.atlas.covariates[state.atlas.index(state.touched) if state.touched else 0]
+    chosen = name or state.touched
+    covariate = state.atlas.covariates[state.atlas.index(chosen) if chosen else 0]
     (low, high), here = covariate.range, dict(state.named)[covariate.name]
     return Sweep(covariate, (here - low) / (high - low))

@@ -227,6 +227,7 @@ class LedgerPage(QScrollArea):
         causes = tuple((one.name, covariate_colour(atlas, one.name)) for one in atlas.covariates)
         ink = Ink(self._theme, causes, atlas.frame.unit)
         least = LEAST_SCALE_MM if ink.unit == MILLIMETRES else 0.0
-        ways = [abs(part.normal_mm) for entry in entries.values() for _, part in words.lines(entry)]
+        parts = [part for entry in entries.values() for _, part in words.lines(entry)]
+        ways = [abs(part.normal_mm) + (part.margin_mm or 0.0) for part in parts]
         for pin, chart in self.charts.items():
             chart.show_entry(entries.get(pin), max([least, *ways]), ink)

@@ -239,9 +239,11 @@ class MainWindow(QMainWindow):
         self._can_undo, self._can_redo = can_undo, can_redo
         self._enable()
 
-    def show_playing(self, is_playing: bool) -> None:
-        """Whether a covariate moves by itself."""
-        self._actions["play"].setChecked(is_playing)
+    def show_playing(self, covariate: str) -> None:
+        """Which covariate moves by itself, by its name; empty for none."""
+        self._actions["play"].setChecked(bool(covariate))
+        for name, row in self.covariates.rows.items():
+            row.show_playing(name == covariate)
 
     def show_left(self, can_go_on: bool) -> None:
         """Whether there is a session of an earlier run to go on with."""

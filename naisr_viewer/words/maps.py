@@ -30,6 +30,7 @@ HINTS = {
 
 
 MUTE = "Leave {covariate} out of the full shape"
+PLAY = "Move {covariate} to and fro by itself"
 SOLO = "Only {covariate} in the full shape"
 """What the switches of a covariate do."""
 

@@ -35,6 +35,7 @@ class CovariatePanel(QFrame):
     support_requested = Signal(object)  # a Support: the data over other covariates, or folded the other way
     reset_requested = Signal(str)  # name: the row's reset button was pressed
     refused = Signal(str)  # why a number that was typed is not taken
+    play_clicked = Signal(str)  # name: it shall begin or end to move by itself
     mute_toggled = Signal(str, bool)  # name: whether it shall be left out of the full shape
     solo_toggled = Signal(str, bool)  # name: whether all others shall be left out of it
     reset_all_requested = Signal()  # "Reset all" was pressed
@@ -79,6 +80,7 @@ class CovariatePanel(QFrame):
             row.value_settled.connect(self.value_settled)
             row.reset_requested.connect(self.reset_requested)
             row.refused.connect(self.refused)
+            row.play_clicked.connect(self.play_clicked)
             row.mute_toggled.connect(self.mute_toggled)
             row.solo_toggled.connect(self.solo_toggled)
             self.rows[covariate.name] = row

@@ -37,6 +37,7 @@ class CovariateRow(QWidget):
     value_settled = Signal(str, float)  # name, real value: the user let go or paused
     reset_requested = Signal(str)  # name: the reset button was pressed
     refused = Signal(str)  # why a number that was typed is not taken
+    play_clicked = Signal(str)  # name: it shall begin or end to move by itself
     mute_toggled = Signal(str, bool)  # name: whether it shall be left out of the full shape
     solo_toggled = Signal(str, bool)  # name: whether all others shall be left out of it
 
@@ -50,6 +51,7 @@ class CovariateRow(QWidget):
         self.slider.setAccessibleName(label(covariate.name))
         self.histogram = Histogram(covariate, observed, self)
         self.reset = _reset_button(covariate, self)
+        self.play = _switch("▸", words.PLAY, covariate, self)
         self.mute = _switch("⊘", words.MUTE, covariate, self)
         self.solo = _switch("◎", words.SOLO, covariate, self)
         self.box = NumberBox(covariate, self) if covariate.kind == "continuous" else None
@@ -71,7 +73,16 @@ class CovariateRow(QWidget):
     def stops(self) -> list[QWidget]:
         """What the Tab key goes through, as it is read."""
         boxes = [] if self.box is None else [self.box]
-        return [*boxes, self.reset, self.solo, self.mute, *self.buttons[:1], self.slider, *self.buttons[1:]]
+        return [
+            *boxes,
+            self.reset,
+            self.play,
+            self.solo,
+            self.mute,
+            *self.buttons[:1],
+            self.slider,
+            *self.buttons[1:],
+        ]
 
     def set_home(self, value: float, is_patient: bool, interval: tuple[float, float] | None = None) -> None:
         """Say where the row is reset to.
@@ -114,6 +125,10 @@ class CovariateRow(QWidget):
             button.setVisible(is_offered)
             button.setChecked(is_on)
 
+    def show_playing(self, is_playing: bool) -> None:
+        """Whether the covariate moves by itself."""
+        self.play.setChecked(is_playing)
+
     def forget_move(self) -> None:
         """Say no more of a movement that has not come to rest."""
         self._settle.stop()
@@ -141,7 +156,7 @@ class CovariateRow(QWidget):
                 head.addWidget(widget)
         tools = QHBoxLayout()
         tools.setSpacing(0)
-        for tool in (self.reset, self.solo, self.mute):
+        for tool in (self.reset, self.play, self.solo, self.mute):
             tool.setFixedWidth(TOOL_PX)
             tools.addWidget(tool)
         head.addLayout(tools)
@@ -170,6 +185,7 @@ class CovariateRow(QWidget):
         self.slider.sliderReleased.connect(self._settled)
         self._settle.timeout.connect(self._settled)
         self.reset.clicked.connect(lambda: self.reset_requested.emit(self.covariate.name))
+        self.play.clicked.connect(lambda: self.play_clicked.emit(self.covariate.name))
         self.mute.clicked.connect(lambda on: self.mute_toggled.emit(self.covariate.name, on))
         self.solo.clicked.connect(lambda on: self.solo_toggled.emit(self.covariate.name, on))
         if self.box is not None:

@@ -75,6 +75,26 @@ def test_a_hand_on_a_slider_takes_over_and_undo_ends_it(ready, qtbot):
     finish(window, controller)
 
 
+def test_each_slider_has_a_button_that_plays_it(ready, qtbot):
+    window, controller = ready
+    age, sex = (window.covariates.rows[name].play for name in ("age", "sex"))
+    qtbot.mouseClick(age, Qt.MouseButton.LeftButton)
+    ages(controller, qtbot, 2)
+    assert age.isChecked() and not sex.isChecked()
+    qtbot.mouseClick(sex, Qt.MouseButton.LeftButton)
+    stopped = dict(controller.state.named)["age"]
+    start = dict(controller.state.named)["sex"]
+    qtbot.waitUntil(lambda: dict(controller.state.named)["sex"] != start)
+    assert sex.isChecked() and not age.isChecked() and dict(controller.state.named)["age"] == stopped > 3.0
+    qtbot.mouseClick(sex, Qt.MouseButton.LeftButton)
+    finish(window, controller)
+    assert not sex.isChecked() and not controller.is_moving
+    for name, earlier in (("sex", start), ("age", 3.0)):
+        controller.undo()
+        assert dict(controller.state.named)[name] == earlier
+    finish(window, controller)
+
+
 def test_it_goes_to_and_fro_between_the_ends(card):
     state = with_values(opened(ExplorerState(), card), (("age", 1.0),))
     sweep = sweep_of(replace(state, touched="age"))
@@ -83,3 +103,5 @@ def test_it_goes_to_and_fro_between_the_ends(card):
     assert [sweep.after(sweeps) for sweeps in (0, 1, 2, 3)] == [low, high, low, high] == [1, 220, 1, 220]
     assert sweep.after(0.5) == sweep.after(1.5) == pytest.approx((low + high) / 2, abs=1)
     assert sweep_of(ExplorerState()) is None
+    chosen = sweep_of(replace(state, touched="age"), "sex")
+    assert chosen is not None and chosen.covariate.name == "sex"
