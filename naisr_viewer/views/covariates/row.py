@@ -22,7 +22,7 @@ from naisr_viewer.words.titles import as_tip, label
 NAME_PX = 32
 """A name is never narrower; the unit gives way."""
 
-TOOL_PX = 20
+LEAST_TOOL_PX, TOOL_PX = 15, 20
 READING_PX = 150
 """A level in words is never wider."""
 
@@ -157,7 +157,8 @@ class CovariateRow(QWidget):
         tools = QHBoxLayout()
         tools.setSpacing(0)
         for tool in (self.reset, self.play, self.solo, self.mute):
-            tool.setFixedWidth(TOOL_PX)
+            tool.setMinimumWidth(LEAST_TOOL_PX)
+            tool.setMaximumWidth(TOOL_PX)
             tools.addWidget(tool)
         head.addLayout(tools)
         self.reading.setVisible(self.box is None)
