@@ -782,7 +782,7 @@ def test_all_scans_are_fitted_with_what_a_table_says_is_known(three, qtbot, monk
     assert [name for name, _, _ in second.fit.intervals] == ["sex"] and dict(second.fit.values)["sex"] == -1.0
     assert dict(third.known) == {"age": 5.0}
     for each, (age, sex) in zip((first, second, third), [(6.0, 1.0), (3.0, -1.0), (5.0, 1.0)], strict=True):
-        assert each.fit.volume_cm3 == pytest.approx(egg(age, sex).volume / 1000, rel=0.05)
+        assert each.fit.extent == pytest.approx(egg(age, sex).volume / 1000, rel=0.05)
     assert not together.fit.isEnabled()
 
 
