@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Collection, Mapping
-from contextlib import AbstractContextManager
+from collections.abc import Collection
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -29,8 +28,8 @@ from naisr_model.measures.kinds import MEASURES
 from naisr_model.measures.norms import Norms, norms_of
 from naisr_model.progress import SILENT, Progress
 from naisr_model.work.cluster import program, shared
-from naisr_model.work.journal import Keep, Record, keeping, plain
-from naisr_model.work.run import Run
+from naisr_model.work.journal import Record, keeping, plain
+from naisr_model.work.resumed import resumed
 
 JOURNAL, CSV, PARQUET, PAGE = "journal.jsonl", "results.csv", "results.parquet", "report.html"
 
@@ -87,8 +86,10 @@ def fit_cohort(
 
         keys = [_key(row) for row in read.rows]
         rows = dict(zip(keys, read.rows, strict=True))
-        is_here = cluster is None and workers == 1
-        found = _found(rows, kept, add, bench, share, is_here, progress.part(KNOWING, TELLING))
+        fit, is_here = partial(fit_row, bench), cluster is None and workers == 1
+        with share as run:
+            left = progress.part(KNOWING, TELLING)
+            found = resumed(fit, rows, kept, add, run, left, is_here=is_here)
         outcomes = tuple(Outcome(row, found[key]) for key, row in zip(keys, read.rows, strict=True))
         cohort = Cohort(read, outcomes, model, usual, why)
         write_all(
@@ -108,28 +109,6 @@ def require_measures(names: Collection[str], atlas: Atlas) -> None:
         raise InputError(f"there is no measure '{unknown[0]}'; give {', '.join(MEASURES)}")
     if atlas.frame.dim == 2 and set(names) - {"area"}:
         raise InputError("of curves in the plane the area is measured, and nothing else; leave out --measure")
-
-
-def _found(
-    rows: Mapping[str, CohortRow],
-    kept: Mapping[str, Record],
-    keep: Keep,
-    bench: Bench,
-    share: AbstractContextManager[Run],
-    is_here: bool,
-    progress: Progress,
-) -> dict[str, Record]:
-    """The record of every row: those that are kept, and those that ``share`` is left to fit."""
-    missing = [key for key in rows if key not in kept]
-    left = progress.part(1 - len(missing) / len(rows), 1.0)
-    # Whether anybody waits cannot be asked from other processes: there a row goes with its process.
-    fit = partial(fit_row, bench, progress=left.quiet) if is_here else partial(fit_row, bench)
-    found = {key: kept[key] for key in rows if key in kept}
-    with share as run:
-        for number, record in run(fit, [rows[key] for key in missing], left):
-            keep(missing[number], record)
-            found[missing[number]] = record
-    return found
 
 
 def _norms(atlas: Atlas, file: Path, progress: Progress) -> tuple[Norms | None, str]:

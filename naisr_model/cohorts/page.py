@@ -40,7 +40,6 @@ POINT = "#2f6fb3"
 COLOURS = (POINT, "#c0562f")
 """Of the two levels of a covariate, told apart by those who see no red or green too."""
 
-
 HEAD = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>{title}</title><style>
 body {{ font: 14px/1.5 system-ui, sans-serif; color: #1d2430; max-width: 1100px; margin: 2em auto;
@@ -119,7 +118,7 @@ def _picture(draw: Any) -> str:
         axes.spines[["top", "right"]].set_visible(False)
         draw(axes)
         figure.savefig(text, format="svg", metadata={"Date": None})
-    return text.getvalue().partition("<svg")[1] + text.getvalue().partition("<svg")[2]
+    return "".join(text.getvalue().partition("<svg")[1:])
 
 
 def _draw_residuals(axes: Axes, cohort: Cohort) -> None:

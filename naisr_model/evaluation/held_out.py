@@ -19,6 +19,7 @@ from naisr_model.data.align import Landmarks, rigid_transform
 from naisr_model.data.populations import PopulationModule, PopulationVisit
 from naisr_model.data.store import INDEX, SampleStore
 from naisr_model.errors import InputError
+from naisr_model.measures.norms import Norms, norms_of
 from naisr_model.shapes.kinds import Shape
 
 
@@ -73,6 +74,17 @@ def opened_store(path: Path) -> SampleStore:
 @lru_cache(maxsize=2)
 def _opened_store(path: Path, _changed: tuple[int, ...]) -> SampleStore:
     return SampleStore.open(path)
+
+
+@lru_cache(maxsize=1)
+def known_norms(atlas: Atlas) -> Norms:
+    """What is usual among the people of an atlas.
+
+    Raises:
+        InputError: when they are too few or all alike, where the model deforms no template, where it folds,
+            or where it is one of curves.
+    """
+    return norms_of(atlas)
 
 
 def held_out_rows(atlas: Atlas, limit: int = 0, subjects: Collection[str] | None = None) -> list[int]:

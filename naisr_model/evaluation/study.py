@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import fields
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, TypeVar
 
@@ -22,6 +22,7 @@ from naisr_model.progress import SILENT, Progress
 from naisr_model.work import journal as journals
 from naisr_model.work.cluster import shared
 from naisr_model.work.journal import Keep, Record, plain
+from naisr_model.work.resumed import resumed
 
 
 class Case(Protocol):
@@ -89,17 +90,14 @@ def run(
     if len({case.key for case in cases}) < len(cases):
         raise ValueError(f"two cases of {study} have the same key")
     with shared(workers, cluster) as work, _keeping(journal, started) as (kept, keep):
-        missing = [case for case in cases if case.key not in kept]
-        left = progress.part(1 - len(missing) / len(cases), 1.0)
-        is_here = cluster is None and workers == 1
-        # Whether anybody waits cannot be asked from other processes: there a case goes with its process.
-        measure = partial(study.measure, progress=left.quiet) if is_here else study.measure
-        records = dict(kept)
-        for number, record in work(measure, missing, left):
+
+        def add(key: str, record: Record) -> None:
             _require_unchanged(study, started)
-            records[missing[number].key] = plain(record)
-            keep(missing[number].key, record)
-        return _summarised(study, [records[case.key] for case in cases], journal if kept else None)
+            keep(key, record)
+
+        jobs, is_here = {case.key: case for case in cases}, cluster is None and workers == 1
+        records = resumed(study.measure, jobs, kept, add, work, progress, is_here=is_here)
+        return _summarised(study, [records[key] for key in jobs], journal if kept else None)
 
 
 def _summarised(study: Study[Any], records: Sequence[Record], journal: Path | None) -> Record:

@@ -34,27 +34,24 @@ class Player(QObject):
         self._frames = QTimer(self, interval=FRAME_MS)
         self._frames.timeout.connect(self._step)
         window.play_requested.connect(self.toggle)
-        window.covariates.play_clicked.connect(self.toggle_one)
+        window.covariates.play_clicked.connect(self.toggle)
         window.covariates.value_moved.connect(self._give_way)  # the user takes over
         window.covariates.values_moved.connect(self._give_way)
         window.closing.connect(self._give_way)
 
-    def toggle(self) -> None:
-        """Begin where the covariate is, or end where it has come to."""
-        if self._sweep is None:
-            self._begin()
-        else:
-            self._end(self._sweep)
+    def toggle(self, name: str = "") -> None:
+        """Begin where a covariate is, or end where it has come to; one that plays gives way to another.
 
-    def toggle_one(self, name: str) -> None:
-        """The same of one covariate, in the place of any that plays."""
+        Args:
+            name: of the covariate; of the one that plays, else of the one moved last, when left out.
+        """
         playing = self._sweep
         if playing is not None:
             self._end(playing)
-        if playing is None or playing.covariate.name != name:
+        if playing is None or name not in ("", playing.covariate.name):
             self._begin(name)
 
-    def _begin(self, name: str = "") -> None:
+    def _begin(self, name: str) -> None:
         self._sweep, self._began_s = sweep_of(self._controller.state, name), time.monotonic()
         if self._sweep is not None:
             self._controller.move(self._sweep.covariate.name, self._sweep.after(0))

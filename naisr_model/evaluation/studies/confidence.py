@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +11,10 @@ import numpy as np
 
 from naisr_model.atlas import Atlas
 from naisr_model.errors import InputError
-from naisr_model.evaluation.held_out import known_population, opened
+from naisr_model.evaluation.held_out import known_norms, known_population, opened
 from naisr_model.evaluation.reports import markdown_table
 from naisr_model.evaluation.truth import Place, beside_truth, truth_places
 from naisr_model.measures.kinds import VOLUME
-from naisr_model.measures.norms import Norms, norms_of
 from naisr_model.progress import SILENT, Progress
 from naisr_model.work.journal import Record
 
@@ -73,7 +71,7 @@ class ConfidenceStudy:
             Cancelled: when nobody waits any more.
         """
         atlas = opened(self.atlases[case.number])
-        norms = _norms(atlas)
+        norms = known_norms(atlas)
         found = beside_truth(atlas, case.place, RESOLUTION, progress)
         low, high = norms.intervals(VOLUME.name, [case.place.values], found.volume_cm3)[:, 0]
         return {
@@ -126,11 +124,6 @@ def _places(number: int, atlas: Atlas) -> list[KnownPlace]:
         *(KnownPlace(number, f"{place.covariate} alone", place) for place in places["effects"]),
         *(KnownPlace(number, "template", place) for place in places["template"]),
     ]
-
-
-@lru_cache(maxsize=1)
-def _norms(atlas: Atlas) -> Norms:
-    return norms_of(atlas)
 
 
 def _summary(records: Sequence[Record]) -> dict[str, float]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +11,11 @@ import igl
 import numpy as np
 from scipy.stats import kstest
 
-from naisr_model.atlas import Atlas
-from naisr_model.evaluation.held_out import aligned, known_population, opened
+from naisr_model.evaluation.held_out import aligned, known_norms, known_population, opened
 from naisr_model.evaluation.studies.calibration import NewPatient, new_patients, visit_of
 from naisr_model.learning.fitting.posterior import TWO_SIDED_95
 from naisr_model.measures.curves import shapes_along
 from naisr_model.measures.kinds import MEASURES, measured
-from naisr_model.measures.norms import Norms, norms_of
 from naisr_model.progress import SILENT, Progress
 from naisr_model.work.journal import Record
 
@@ -54,7 +51,7 @@ class NormsStudy:
             Cancelled: when nobody waits any more.
         """
         atlas = opened(self.atlas)
-        norms, visit = _norms(atlas), visit_of(atlas, case, self.patients)
+        norms, visit = known_norms(atlas), visit_of(atlas, case, self.patients)
         mesh_mm, values = aligned(atlas, *known_population(atlas).visit_shape(visit)), dict(visit.values)
         fit = atlas.fit(mesh_mm, values, progress=progress)
         usual, own = (
@@ -100,11 +97,6 @@ class NormsStudy:
 
 def _title(name: str) -> str:
     return MEASURES[name].title.lower() if name in MEASURES else name
-
-
-@lru_cache(maxsize=1)
-def _norms(atlas: Atlas) -> Norms:
-    return norms_of(atlas)
 
 
 def _summary(z: np.ndarray) -> dict[str, float]:

@@ -51,7 +51,6 @@ class ExportDialog(QDialog):
         super().__init__(parent)
         assert state.atlas is not None
         is_flat = state.atlas.is_flat
-        self._note = FLAT_NOTE if is_flat else NOTE
         self.setWindowTitle("Export curves" if is_flat else "Export surfaces")
         self.setMinimumWidth(460)
         on_screen = visible_panels(state)
@@ -71,7 +70,7 @@ class ExportDialog(QDialog):
             self.detail.addItem(f"{resolution}{'²' if is_flat else '³'}{usual}", resolution)
         self.detail.setCurrentIndex(RESOLUTIONS.index(EXACT_RESOLUTION))
         self.folder = QLineEdit(str(Path.home()), self)
-        self._compose()
+        self._compose(is_flat)
 
     def choice(self) -> ExportChoice:
         """What the dialog says now."""
@@ -86,14 +85,14 @@ class ExportDialog(QDialog):
         """Show the dialog; None when it was cancelled."""
         return self.choice() if self.exec() == QDialog.DialogCode.Accepted else None
 
-    def _compose(self) -> None:
+    def _compose(self, is_flat: bool) -> None:
         browse = QPushButton("Browse…", self)
         browse.clicked.connect(self._browse)
         where = QHBoxLayout()
         where.addWidget(self.folder, 1)
         where.addWidget(browse)
         form = QFormLayout()
-        form.addRow("&Surfaces" if self._note is NOTE else "&Curves", self.what)
+        form.addRow("&Curves" if is_flat else "&Surfaces", self.what)
         if self.figure is not None:
             self.figure.addItems([name.upper() for name in FIGURES])
             form.addRow("F&igure", self.figure)
@@ -103,7 +102,7 @@ class ExportDialog(QDialog):
         label = QLabel("F&older", self)
         label.setBuddy(self.folder)
         form.addRow(label, where)
-        note = QLabel(self._note, self)
+        note = QLabel(FLAT_NOTE if is_flat else NOTE, self)
         note.setObjectName("muted")
         note.setWordWrap(True)
         column = column_in(self)
